@@ -5,7 +5,7 @@ is OK: share in which the true error is within the stated one, per cent, stated 
 true error that 95 of 100 points keep to, per cent of the incident wave. Parts:
 
     lit, close, shadow, axis    E and H off the body, the larger error of the two, as in `studies.near_coverage`
-    J lit, J dark               the current on lit ground, and in the shadow, the penumbra included
+    J lit, J dark               the current on the lit side, and in the shadow, the penumbra included
     charge                      n.E, judged by its own error
     not OK                      per cent of the points off the body, and on it
 

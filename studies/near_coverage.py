@@ -8,7 +8,7 @@ true error in the median. Parts:
     close      within a quarter of a wavelength of the body; between currents and the field on it
     shadow     off the body, behind it; by rays or currents, whichever states less
     axis       about the axis behind it, where rays merge
-    on lit     on lit ground
+    on lit     on the lit side
     on dark    on the body in the shadow, the penumbra included
     not OK     per cent of the points off the body, and on it
 

@@ -32,7 +32,7 @@ from creeping.rays.reach import ray_length
 from creeping.shadow.line import ShadowLine
 
 CUT = 1e-3
-"""Share of the shadow line without rays from which lit ground is not that of a convex body."""
+"""Share of the shadow line without rays from which the lit side is not that of a convex body."""
 POOR = 0.01
 """What currents leave of the incident wave inside from which the equation of any body is solved: next to the body they
 err by ten times that."""

@@ -48,8 +48,8 @@ class ConductorField(PointData):
         the body's integral equation gave them, "layer" between them and the body, or "rays"; on the body that of
         `ConductorCurrent`.
     incident, scattered, creeping : Fields
-        Parts, whose sum the field is: where currents or lit ground served, the incident wave and the rest; where rays
-        did, the sum over them, which in the shadow is the whole field.
+        Parts, whose sum the field is: where currents were used, or the expansion of the lit side, the incident wave and
+        the rest; where rays did, the sum over them, which in the shadow is the whole field.
     incident_electric : (3,) or (3, 2) complex
         E0 of the incident wave, of both polarisations if none was chosen.
 

@@ -23,8 +23,8 @@ an edge and scattered again.
 Also here: physical optics of the lit tiles of a body: what its facets and curved pieces reflect, and the shadow they
 cast.
 
-    f = -(ik/4π) ∫ [(1 + R) n.r + (1 - R) n.d] e^{ik(d - r).x} dS     over lit ground, R of a plane at its cos θᵢ = -n.d
-    f = (ik/2π) [V - (V.r) r],  V = ∫ n e^{ik(d - r).x} dS x (d x E)   of a conductor
+    f = -(ik/4π) ∫ [(1 + R) n.r + (1 - R) n.d] e^{ik(d - r).x} dS     over the lit side, R of a plane at its cos θᵢ =
+    -n.d f = (ik/2π) [V - (V.r) r],  V = ∫ n e^{ik(d - r).x} dS x (d x E)   of a conductor
 
 On curved ground n.r is replaced by (2w - 1) n.d, w = 1 in the forward lobe and 0 elsewhere: they agree at specular
 points and ahead, and n.d has no jump at the shadow line, where the current of a hard body does not stop.
@@ -299,7 +299,7 @@ def _ended(fan: RayFan, observers: FloatArray, k: float, kind: Boundary) -> Floa
 
 
 def _goes_straight(fan: RayFan) -> BoolArray:
-    """Rays (rays,) that detach by rounding, where they come to straight ground beyond a joint, and by theory do not."""
+    """Rays (rays,) that detach by rounding, where they come to a straight surface beyond a joint, and by theory do not."""
     after = np.minimum(np.searchsorted(fan.travel_time, fan.detachment), len(fan.travel_time) - 1)
     bent = np.take_along_axis(fan.curvature, after[:, None], axis=1)[:, 0]
     return np.asarray((fan.status == RayStatus.DETACHED) & (bent > -STRAIGHT / size(fan.body)))

@@ -56,7 +56,7 @@ class Echo(Drawn):
     sound_speed : float, m/s, optional
         That of light if None.
     otherwise : str
-        What served where currents did not: "rays", or "rays+optics" of a body with edges, joints or tips.
+        The method used where currents were not: "rays", or "rays+optics" of a body with edges, joints or tips.
 
     Raises
     ------

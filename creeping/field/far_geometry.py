@@ -3,7 +3,7 @@
 Rays of the fans, carried in long steps, tell where to look; those that matter are traced again, exactly. Observers are
 numbered through: (incidence 0, its first observer), (incidence 0, its second), ...
 
-Also here: the fold caustic of the reflected field, where lit ground has K = 0: how large the field is about it.
+Also here: the fold caustic of the reflected field, where the lit side has K = 0: how large the field is about it.
 
 On one side of it, where a direction's normal n_w = (r - d)/|r - d| is taken twice near a parabolic point, two specular
 points merge; on the other there is none, and the field of isolated points is 0. About it physical optics gives, with

@@ -335,7 +335,7 @@ def far_dataset(far: FarField) -> xarray.Dataset:
         far.unresolved,
         {"long_name": "an expansion fails, or the error is large"},
     )
-    variables["method"] = (("direction",), far.method, {"long_name": "what served"})
+    variables["method"] = (("direction",), far.method, {"long_name": "the method used"})
     words = {"boundary": far.boundary, "order": far.order, "conventions": "time factor exp(-i omega t)"}
     found: xarray.Dataset = library.Dataset(variables, coordinates, words)
     return found

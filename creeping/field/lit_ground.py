@@ -1,15 +1,15 @@
-"""The field on lit ground put together with the rays that come there, and how far the lit side's expansion is off.
+"""The field on the lit side put together with the rays that come there, and how far the lit side's expansion is off.
 
-The error of lit ground, as a share of u1 and with u2 of second order, is
+The error of the lit side, as a share of u1 and with u2 of second order, is
 
     [(A |u2/u1 - 1|^2)^2 + (B/(m^4 (1 + G xi^2)))^2 + (C (|rho rho''| + rho'^2)/m^2)^2 + (D r^2/m^4)^2 + E^2]^(1/2)
     E = F max(0, 1 - 2 max(kappa_a, 0) a)/(k a max(c, 1/m_a)^3),   m_a = (ka/2)^(1/3)
 
 r is kappa_b/kappa_a, of a conductor its root. E is for ground that is flat by the measure of the body's size a: the
 second order kappa_a/(2kc^3) of optics knows nothing there of the curvature at its end, which on a closed body is 1/a in
-the mean. Where rays end or the body hides part of its line, 2 epsilon more: not all waves that come to lit ground from
-elsewhere on the body are known, and what currents leave inside (`creeping.field.currents.whole_body`) tells how large
-the others are; where that cannot be measured the error is a bound.
+the mean. Where rays end or the body hides part of its line, 2 epsilon more: not all waves that come to the lit side
+from elsewhere on the body are known, and what currents leave inside (`creeping.field.currents.whole_body`) tells how
+large the others are; where that cannot be measured the error is a bound.
 
 Sources: [F46], [LK59]; Derivations, F16 and F20. The factors were set on four bodies (`studies._point_coverage`), F on
 x^4 + y^4 + z^4 = 1 at k = 8 and 14.
@@ -32,7 +32,7 @@ from creeping.rays.fan import RayFan
 from creeping.rays.status import RayStatus
 
 SQUARED = {"soft": 0.7, "hard": 2.0, "impedance": 0.6, "conductor": 2.0}
-"""Factor A of the error on lit ground, by boundary."""
+"""Factor A of the error on the lit side, by boundary."""
 LEAST = {"soft": 0.02, "hard": 0.02, "impedance": 0.05, "conductor": 0.25}
 """B."""
 FADES = {"soft": 0.0, "hard": 0.0, "impedance": 0.0, "conductor": 1.0}
@@ -46,12 +46,12 @@ ACROSS = {"soft": 0.05, "hard": 0.05, "impedance": 0.15, "conductor": 0.3}
 FLAT, ENDS = 2.0, 0.7
 """1/(kappa_a a) from which ground is flat, and factor F of what the curvature at its end is worth."""
 LEFT, UNKNOWN = 2.0, 2.0
-"""Factor of what currents leave inside, of waves that come to lit ground from elsewhere on the body; and their bound, a
+"""Factor of what currents leave inside, of waves that come to the lit side from elsewhere on the body; and their bound, a
 reflected wave and its image."""
 AFAR = {"soft": 1.5, "hard": 2.5, "impedance": 2.0, "conductor": 2.5}
-"""The factor on dark ground where waves are marched beyond the end of rays."""
+"""The factor on the dark side where waves are marched beyond the end of rays."""
 WELL_KNOWN = 0.04
-"""What currents of a conductor leave at most where that tells of dark ground; beyond, the factor grows with it."""
+"""What currents of a conductor leave at most where that tells of the dark side; beyond, the factor grows with it."""
 
 NO_VALUE = 1e30
 """Size from which a value is that of a tip."""
@@ -85,7 +85,7 @@ def composed(
     wave, lit_off, share = lit
     unknown = (share > 0) & (not np.isfinite(left))
     lit_off = np.hypot(lit_off, share * unit * (LEFT * left if np.isfinite(left) else UNKNOWN))
-    # where rays have ended the march goes on, but waves from elsewhere come to dark ground as well
+    # where rays have ended the march goes on, but waves from elsewhere come to the dark side as well
     afar, dark = AFAR[kind.kind], 1 - share
     if kind.kind == "conductor":
         # such waves come to the penumbra as they do beyond it
@@ -93,11 +93,11 @@ def composed(
     lit_off = np.hypot(lit_off, (by == "march") * dark * unit * afar * left if np.isfinite(left) else 0.0)
     creeping, error, status = rays.values, rays.error, rays.status
     bare = (status != FieldStatus.OK) & (error == 0)
-    # next to the line rays have hardly a share: what ends with the fan is less there than lit ground is off by
+    # next to the line rays have hardly a share: what ends with the fan is less there than the lit side is off by
     harmless = np.isin(status, (FieldStatus.TRUNCATED, FieldStatus.CAUSTIC)) & ~bare & (share > 0) & (error <= lit_off)
     status = np.where(harmless, FieldStatus.OK, status)
     error = np.where(bare, unit, error)
-    # on lit ground rays that come from afar have decayed: those that are not to be trusted are left out, and no more
+    # on the lit side rays that come from afar have decayed: those that are not to be trusted are left out, and no more
     # than what an axis makes of them, sqrt(2 pi k a)
     most = unit * rays.faded * np.sqrt(2 * np.pi * k * size(fan.body))
     out = (share == 1) & ((status != FieldStatus.OK) | (error > most))
@@ -154,7 +154,7 @@ def lit_error(
 
 
 def _flat_error(part: LitNodes, k: float, extent: float) -> FloatArray:
-    """E (n,): what the curvature at the end of flat ground is worth on it."""
+    """E (n,): what the curvature at the end of a flat surface is worth on it."""
     flatness = np.maximum(0.0, 1 - FLAT * np.maximum(part.along, 0.0) * extent)
     least = np.cbrt(2 / (k * extent))
     return np.asarray(ENDS * flatness / (k * extent * np.maximum(part.cosine, least) ** 3))

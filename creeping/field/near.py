@@ -106,7 +106,7 @@ def near_field(
     Returns
     -------
     NearField
-        In units of the incident wave; ``method`` says what served at each point.
+        In units of the incident wave; ``method`` names the method used at each point.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The field on the body: u, or du/dn where u = 0, of creeping rays in the shadow and of the wave itself on lit ground.
+"""The field on the body: u, or du/dn where u = 0, of creeping rays in the shadow and of the wave itself on the lit side.
 
     u = (1 - W) e^{ikd.x} u_lit + sum_rays w_i u_i,   W = W(xi; 0, 0.6),   w_i = W for rays that have just left the line
 
@@ -221,7 +221,7 @@ def total_on(
     left = currents.extinction if currents else 0.0 if alone else np.nan
     if currents and order == 2 and kind.kind in ("soft", "hard") and not jointed:
         thrown = currents.thrown(points, normal(fan.body, points))
-        # as much may come later, to and fro, and to dark ground, whose rays do not know of it
+        # as much may come later, to and fro, and to the dark side, whose rays do not know of it
         lit = lit[0] + lit[2] * thrown, np.hypot(lit[1], np.abs(thrown)), lit[2]
     field = composed(fan, lit, rays, by, left, k, kind, unit)
     return without_tips(field) if jointed else field

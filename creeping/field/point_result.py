@@ -52,7 +52,7 @@ class FieldStatus(IntEnum):
     NO_RAY = 3
     """In the shadow no creeping ray comes: behind ground that launches none, or where rays have decayed to nothing."""
     DETACHED = 4
-    """A ray that comes here has ended before, over concave or rough ground, and may have mattered."""
+    """A ray that comes here has ended before, over a concave or rough surface, and may have mattered."""
     TRUNCATED = 5
     """The fan ends before its rays could come here."""
     UNRESOLVED = 6
@@ -100,7 +100,7 @@ class PointData(Shown):
     status : (...) of int
         Codes of `FieldStatus`.
     method : (...) of str
-        What served, joined by "+" where two were blended.
+        The method used, joined by "+" where two were blended.
     wavenumber : float, 1/L
     boundary : str
     order : int
@@ -207,8 +207,8 @@ class NearField(PointField):
         "layer" between them and the body, "rays", or, where an admittance varies and neither serves, "none"; on the
         body "lit", "rays", "march" and both with "lit+", "equation", or "boundary", where u = 0.
     incident, scattered, creeping : (...) complex
-        Parts, whose sum the values are: where currents or lit ground served, the incident wave and the rest; where rays
-        did, the sum over them, which in the shadow is the whole field.
+        Parts, whose sum the values are: where currents were used, or the expansion of the lit side, the incident wave
+        and the rest; where rays did, the sum over them, which in the shadow is the whole field.
 
     Examples
     --------
@@ -240,7 +240,7 @@ class SurfaceField(PointField):
         "equation" where the body's integral equation is solved.
     lit, creeping : (...) complex
         Parts, whose sum the values are: what the lit side's expansion gives, and creeping rays; of the equation what
-        it is on lit and on dark ground.
+        it is on the lit and on the dark side.
 
     Examples
     --------
@@ -270,7 +270,7 @@ class Served:
     Attributes
     ----------
     wave : (n,) complex
-        The incident wave and what it excites by currents or on lit ground; 0 where creeping rays alone serve.
+        The incident wave and what it excites by currents or on the lit side; 0 where creeping rays alone serve.
     creeping : (n,) complex
         Of creeping rays.
     error : (n,)

@@ -70,7 +70,7 @@ def reflection(
 def _flat_reflection(
     cosine: FloatArray, along: FloatArray, across: FloatArray, k: float, boundary: Boundary, order: int
 ) -> ComplexArray:
-    """R (n,) where P does not serve: on flat and concave ground, and far from grazing."""
+    """R (n,) where P does not serve: on flat and concave surfaces, and far from grazing."""
     first = plane_reflection(cosine, boundary)
     if order == 1:
         return first

@@ -58,7 +58,7 @@ class SourcePattern(ArrayResult, Drawn):
         Codes of `FieldStatus`; UNRESOLVED, with the value 0 and a bound for its error, where the plane wave from a
         direction has no shadow line.
     method : (m, s) of str
-        What served, as of `near_field`.
+        The method used, as of `near_field`.
     wavenumber : float, 1/L
     boundary : str
     length_unit : str

@@ -241,7 +241,7 @@ def notes(cut: "FieldCut") -> dict[str, str]:
         columns[f"im_{name}"] = "imaginary part"
     columns["error"] = f"of the field, {field.unit}"
     columns["status"] = "0 OK, 1 LIT, 2 CAUSTIC, 3 NO_RAY, 4 DETACHED, 5 TRUNCATED, 6 UNRESOLVED"
-    columns["method"] = "what served"
+    columns["method"] = "the method used"
     return columns
 
 

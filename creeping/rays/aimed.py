@@ -250,7 +250,7 @@ def same_within(rays: RayPoints, cell: FloatArray) -> FloatArray:
     """Distance of launch points, L, and difference of times below which two rays found (n,) are one: (n, 2).
 
     ``cell`` (n, 2) is that of the fan in which each was sought. What is left of r - p, up to ACCEPTED, is a step of J'
-    across the rays and of κₙ along them: far on flat ground.
+    across the rays and of κₙ along them: far on a flat surface.
     """
     turn = np.stack([np.abs(rays.spreading_rate), np.abs(rays.curvature[1])], axis=1)
     with np.errstate(divide="ignore"):

@@ -67,7 +67,7 @@ class MarchedWaves(VectorWaves):
         return ratio, np.zeros_like(ratio)
 
     def turn(self, strip: int, sigma: FloatArray, nodes: BodyNodes, p: FloatArray) -> FloatArray:
-        """T rho of tangents p (n, 3) at nodes, of rays at places (n,) of a strip, 0 on flat and concave ground."""
+        """T rho of tangents p (n, 3) at nodes, of rays at places (n,) of a strip, 0 on flat and concave surfaces."""
         rays, back = self.starts(strip, sigma)
         return faded(nodes.curvature(p), nodes.twist(p), rays.curvature[1][back])
 

@@ -1,4 +1,4 @@
-"""What lit ground that faces other parts of the body receives from them: one bounce of physical optics.
+"""What the lit side that faces other parts of the body receives from them: one bounce of physical optics.
 
     hard  u(x) += 2 int_(t > 0) W(t) u dG/dn_y dS_y,   soft  du/dn(x) += 2ik int_(t > 0) t W(t) du/dn G dS_y
     conductor  J(x) += 2 n_x x int_(t > 0) W(t) grad_x G x J dS_y
@@ -37,7 +37,7 @@ SADDLE = -1e-3
 
 
 def faces_itself(part: LitNodes) -> bool:
-    """Whether lit ground is somewhere not convex, so that it may face other parts of the body."""
+    """Whether the lit side is somewhere not convex, so that it may face other parts of the body."""
     total = part.along + part.across
     gauss = part.along * part.across - part.twist**2
     return _has_saddles(gauss, total**2)

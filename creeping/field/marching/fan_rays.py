@@ -1,7 +1,7 @@
-"""Profiles of the rays of a fan: curvatures, twist and spreading, and those of the lit ground behind the shadow line.
+"""Profiles of the rays of a fan: curvatures, twist and spreading, and those of the lit side behind the shadow line.
 
     kappa_n = p.Hp/|grad F|,   kappa_t = b.Hb/|grad F|,   tau = b.Hp/|grad F|,   b = n x p
-    J'' + K J = 0,   J(0) = 1,   J'(0) = 0,   V = K/2 (+ (J'/2J)^2 on lit ground),   K = kappa_n kappa_t - tau^2
+    J'' + K J = 0,   J(0) = 1,   J'(0) = 0,   V = K/2 (+ (J'/2J)^2 on the lit side),   K = kappa_n kappa_t - tau^2
 
 Lambda = D y/y_s is that of the incident wave where it drives the layer, behind that of Fock's, a function of xi alone:
 
@@ -73,7 +73,7 @@ def fan_profiles(
     length : float, L, optional
         Of the rays; that of the fan if not given.
     behind : float, L, optional
-        How far the profiles go back on lit ground.
+        How far the profiles go back on the lit side.
     boundary : Boundary, optional
         Whose admittance is taken along, if it varies.
 

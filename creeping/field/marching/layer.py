@@ -156,7 +156,7 @@ class MarchedRays:
 
 
 def march_rays(profiles: RayProfiles, *, wavenumber: float, boundary: Boundary) -> MarchedRays:
-    """March the wave along each ray of a batch, from lit ground to its end.
+    """March the wave along each ray of a batch, from the lit side to its end.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ LEAST_CURVATURE = 0.05
 """Share of the largest curvature that scales are taken from at least."""
 CAPS, ELEMENTS, HEIGHTS = 1.04, 1.2, 1.35
 """Ratios of neighbouring caps, of longest elements, and of heights and first elements: finer ones fill fewer lanes. A
-cap off by 5 % costs the penumbra before concave ground half of its accuracy where k over the curvature is 20."""
+cap off by 5 % costs the penumbra before a concave surface half of its accuracy where k over the curvature is 20."""
 BACK = 3.0
 """Rays of optics come from so many radii of curvature behind the start at most."""
 BLUNT = 3.0
@@ -60,7 +60,7 @@ class MarchStatus(IntEnum):
     DEEP = 2
     """A dip deeper or steeper than a layer over it can be: the wave behind ``reliable`` is not that of the body."""
     UNLIT = 3
-    """No convex lit ground from which to start: there is no wave."""
+    """No convex part of the lit side to start from: there is no wave."""
     HOLLOW = 4
     """Concave ground in the light behind the start: what it throws along the body is left out everywhere."""
     UNSTABLE = 5
@@ -76,7 +76,7 @@ _REMEDIES = {
     MarchStatus.OK: "none needed",
     MarchStatus.SHARP: "take a higher wavenumber, or round the edge off",
     MarchStatus.DEEP: "none by marching: the wave leaves one part of the body for another",
-    MarchStatus.UNLIT: "begin the profile further back on lit ground",
+    MarchStatus.UNLIT: "begin the profile further back on the lit side",
     MarchStatus.HOLLOW: "none by marching: the error may be several times that stated",
     MarchStatus.UNSTABLE: "give the curvature on more nodes",
 }
@@ -236,7 +236,7 @@ def _too_deep(s: FloatArray, look: FloatArray, depth: float, served: BoolArray) 
         # the chord meets the normal of a place at this height
         length = np.sum((x[i:] - x[i]) * tangent[i:], axis=1) / here
         height = np.sum((x[i] + length[:, None] * tangent[i] - x[i:]) * normal[i:], axis=1)
-        # it lands where it meets the ground, or where rising ground turns parallel to it again
+        # it lands where it meets the ground, or where a rising surface turns parallel to it again
         rising = np.maximum.accumulate((turn < 0) & (s[i:] > s[dip]))
         landed = (towards < 0.1) | ((height < 0) & (s[i:] > s[dip])) | (rising & (turn >= 0))
         over = np.cumsum(landed) == 0

@@ -19,7 +19,7 @@ Unknowns are the value and the slope (times a scale) at each height 0 = n_0 < n_
     M[f] = int S f v w dn,   D[f] = int f v' w'/S dn,   M_i = M[m^i],   D_i = D[m^i]
 
 The derivative is stretched into the complex and the potential h^2 - 1 stays real: continued as well, it would grow like
-e^{k |kappa| Im n s} over concave ground. There h = 1 + kappa m(n) stays positive, c = 0.85/|kappa| of the deepest
+e^{k |kappa| Im n s} over a concave surface. There h = 1 + kappa m(n) stays positive, c = 0.85/|kappa| of the deepest
 concave point: above 0.6 c the layer is not the body's any more.
 
 What the torsion of a ray adds holds for low heights only and would turn waves back from above, t instead of n keeps it
@@ -57,7 +57,7 @@ KEPT = 64
 
 @dataclass(frozen=True, eq=False)
 class RayProfiles:
-    """Rays of a fan, or the two senses of a plane section, from lit ground on.
+    """Rays of a fan, or the two senses of a plane section, from the lit side on.
 
     Parameters
     ----------

@@ -234,7 +234,7 @@ class Coupling(ArrayResult, Drawn):
             "total": (dims, self.values, {"units": units, "long_name": meaning}),
             "error": (dims, self.error, {"units": units}),
             "status": (dims, self.status, {"long_name": "code of FieldStatus"}),
-            "method": (dims, self.method, {"long_name": "what served"}),
+            "method": (dims, self.method, {"long_name": "the method used"}),
             "port": (("source", "axis"), self.ports, {"units": self.length_unit}),
         }
         if self.axes is not None:
