@@ -299,7 +299,7 @@ def _ended(fan: RayFan, observers: FloatArray, k: float, kind: Boundary) -> Floa
 
 
 def _goes_straight(fan: RayFan) -> BoolArray:
-    """Rays (rays,) that detach by rounding, where they come to a straight surface beyond a joint, and by theory do not."""
+    """Rays (rays,) that detach by rounding alone, where they come to a straight surface beyond a joint."""
     after = np.minimum(np.searchsorted(fan.travel_time, fan.detachment), len(fan.travel_time) - 1)
     bent = np.take_along_axis(fan.curvature, after[:, None], axis=1)[:, 0]
     return np.asarray((fan.status == RayStatus.DETACHED) & (bent > -STRAIGHT / size(fan.body)))

@@ -46,7 +46,7 @@ ACROSS = {"soft": 0.05, "hard": 0.05, "impedance": 0.15, "conductor": 0.3}
 FLAT, ENDS = 2.0, 0.7
 """1/(kappa_a a) from which ground is flat, and factor F of what the curvature at its end is worth."""
 LEFT, UNKNOWN = 2.0, 2.0
-"""Factor of what currents leave inside, of waves that come to the lit side from elsewhere on the body; and their bound, a
+"""Factor of what currents leave inside, of waves that come to the lit side from elsewhere; and their bound, a
 reflected wave and its image."""
 AFAR = {"soft": 1.5, "hard": 2.5, "impedance": 2.0, "conductor": 2.5}
 """The factor on the dark side where waves are marched beyond the end of rays."""

@@ -1,4 +1,4 @@
-"""The field on the body: u, or du/dn where u = 0, of creeping rays in the shadow and of the wave itself on the lit side.
+"""The field on the body: u, or du/dn where u = 0, of creeping rays in the shadow, of the wave itself on the lit side.
 
     u = (1 - W) e^{ikd.x} u_lit + sum_rays w_i u_i,   W = W(xi; 0, 0.6),   w_i = W for rays that have just left the line
 
