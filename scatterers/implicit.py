@@ -116,7 +116,7 @@ class Implicit(LevelBody):
         self._creases = [*(Crease("tip", (k, k), tip[None]) for tip, k in zip(tips, ends, strict=True)), *along]
         if any(crease.kind != "seam" for crease in self._creases):
             # only a body of pieces has the members of one: by them it is told from a smooth body
-            self.__class__ = CreasedImplicit
+            self.__class__ = PiecewiseImplicit
 
     def _tips(self, samples: Samples, strict: bool) -> FloatArray:
         points, spacing, size = samples.crossings(), float(samples.spacing.max()), self._diagonal
@@ -206,7 +206,7 @@ class Implicit(LevelBody):
         return self._named
 
 
-class CreasedImplicit(Implicit):
+class PiecewiseImplicit(Implicit):
     """Body of an expression with creases; `Implicit` makes it of its own accord."""
 
     @property

@@ -11,8 +11,8 @@ from functools import cached_property
 import numpy as np
 
 from creeping._typing import Any, ArrayLike, FloatArray
-from creeping.geometry.creased import drawn_mesh
 from creeping.geometry.evaluators import polar_frame
+from creeping.geometry.piecewise import drawn_mesh
 from creeping.geometry.surface import Surface, size
 from creeping.plotting import axes3d
 from creeping.plotting._drawing import Drawing, Mark, View

@@ -83,12 +83,12 @@ def _field(shape: Any, wavenumber: float | None, answer: dict[str, Any], texts: 
 
     from creeping.field.body_currents import POOR
     from creeping.field.equation.solving import plan_of
-    from creeping.geometry.creased import has_edges, is_creased
     from creeping.geometry.parts import why_no_rays
+    from creeping.geometry.piecewise import has_edges, is_piecewise
 
     without = why_no_rays(shape)
     kind = without or (
-        f"in smooth pieces with {len(shape.creases)} creases" if is_creased(shape) else "one smooth surface"
+        f"in smooth pieces with {len(shape.creases)} creases" if is_piecewise(shape) else "one smooth surface"
     )
     size = float(np.max(np.ptp(np.asarray(shape.bounds, dtype=float), axis=0)))
     k = wavenumber or 2 * np.pi * WAVELENGTHS / size
@@ -98,7 +98,7 @@ def _field(shape: Any, wavenumber: float | None, answer: dict[str, Any], texts: 
         "an incidence, errors of 0.01 to 1 % of the largest |f|"
     )
     expansions = "creeping rays and currents by expansions"
-    if not plan.refused and (without or is_creased(shape)):
+    if not plan.refused and (without or is_piecewise(shape)):
         by = equation
     elif not plan.refused:
         by = f"{expansions}; where these leave more than {100 * POOR:g} % of the wave inside, {equation}"

@@ -24,8 +24,8 @@ from creeping.field.impulse import RangeProfile, range_profile
 from creeping.files import read_cut, write_echo, write_mat, write_profile
 from creeping.files.measured import MeasuredCut
 from creeping.geometry.checks import WRONG_SIGNS, wrong_signs
-from creeping.geometry.creased import is_creased
 from creeping.geometry.directions import directions_from_azimuth_elevation
+from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface
 from creeping.shadow.status import FAILED, SINGULAR
 from creeping.sweeping.echoes import backscatter, bistatic
@@ -297,7 +297,7 @@ def write_results(
     names = [f"{stem}.{kind}" for kind in formats]
     for kind in formats:
         writers[kind](output / f"{stem}.{kind}", echo)
-    extra: dict[str, Any] = {"wrong_signs": wrong_signs(body)[0]} if is_creased(body) else {}
+    extra: dict[str, Any] = {"wrong_signs": wrong_signs(body)[0]} if is_piecewise(body) else {}
     for channel, found in comparisons.items():
         extra.setdefault("compared", {})[channel] = found.summary()
     profiles = _profiles(echo)

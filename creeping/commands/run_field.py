@@ -23,9 +23,9 @@ from creeping.field.forward import lobe_step
 from creeping.field.uncertainty import far_field_uncertainty
 from creeping.field.validity_range import Validity, validity
 from creeping.files.ffe import grid_directions
-from creeping.geometry.creased import is_creased
 from creeping.geometry.directions import unit_direction
 from creeping.geometry.incident import REMEDY
+from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan
 
@@ -222,7 +222,7 @@ class Job:
             )
             names.append("field.png")
         # at points between rays the field needs a smooth body
-        elif isinstance(of, RayFan) and self.boundary != "pec" and not is_creased(of.body):
+        elif isinstance(of, RayFan) and self.boundary != "pec" and not is_piecewise(of.body):
             options: dict[str, Any] = {"wavenumber": self.wavenumber, "boundary": self.boundary, "order": ORDER}
             options["wave"] = self.told(far.unit)
             plotting.surface_field_picture(output / "field.png", of, backend=backend, dpi=DPI, **options)

@@ -39,7 +39,7 @@ def summary_of(body: str, speed: str | None, line: Any, carrier: Any, fan: Any, 
     """What the summary file holds."""
     import numpy as np
 
-    from creeping.geometry.creased import is_creased
+    from creeping.geometry.piecewise import is_piecewise
     from creeping.rays.status import RayStatus
 
     summary: dict[str, Any] = {
@@ -70,7 +70,7 @@ def summary_of(body: str, speed: str | None, line: Any, carrier: Any, fan: Any, 
             "max": carrier.error.max,
             "samples": carrier.error.samples,
         }
-    if is_creased(fan.body):
+    if is_piecewise(fan.body):
         summary["losses"] = fan.losses()._asdict()
     summary |= _of_the_body(fan)
     return summary

@@ -24,7 +24,7 @@ from creeping.explorer.wave import (
     wave_colours,
 )
 from creeping.field.on_body import creeps
-from creeping.geometry.creased import drawn_mesh
+from creeping.geometry.piecewise import drawn_mesh
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.triangulation import Triangulation
 from creeping.plotting._drawing import shadow_view

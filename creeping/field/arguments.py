@@ -13,9 +13,9 @@ from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.creeping_modes import fock_scale
 from creeping.geometry.arguments import positive_number, real_array, shown
-from creeping.geometry.creased import checked_smooth, has_edges
 from creeping.geometry.directions import unit_directions
 from creeping.geometry.evaluators import speed_of
+from creeping.geometry.piecewise import checked_smooth, has_edges
 from creeping.geometry.surface import Surface
 from creeping.rays.quantities import RayPoints
 

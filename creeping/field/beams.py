@@ -55,7 +55,7 @@ from creeping.field.shed_wave import smoothstep
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.pieces import trace_pieces
 from creeping.geodesics.states import M11, M12, M21, M22, P, X, pack
-from creeping.geometry.creased import is_creased
+from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.quadrature import BodyNodes, nodes_at
 from creeping.geometry.surface import normal, project, size
 from creeping.kernels.threads import in_threads
@@ -190,7 +190,7 @@ class _Beams:
         first = waves.strips[number].at(sigma, np.zeros(count))
         launched = pack(project(body, first.points), first.directions, jacobi=True)
         ended = np.zeros((count, len(times)), dtype=bool)
-        if is_creased(body):
+        if is_piecewise(body):
             trace = trace_pieces(body, launched, times, rtol=RTOL)
             self.states, ended = trace.states, trace.end[:, None] <= times
         else:

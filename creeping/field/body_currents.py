@@ -24,7 +24,7 @@ from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
 from creeping.field.equation.solving import Solved, asked_solution, expected_seconds_of, is_large, solution_for
 from creeping.geometry.arguments import one_of
-from creeping.geometry.creased import has_edges, is_creased
+from creeping.geometry.piecewise import has_edges, is_piecewise
 from creeping.geometry.quadrature import node_count
 from creeping.geometry.surface import Surface, size
 from creeping.rays.fan import RayFan
@@ -101,7 +101,7 @@ def surface_currents(
     if solve:
         return _of_line(fan, asked_solution(*problem))
     # expansions know little of joints and tips, and nothing of edges
-    found = solution_for(*problem) if solve is None and is_creased(fan.body) else None
+    found = solution_for(*problem) if solve is None and is_piecewise(fan.body) else None
     if found:
         return _of_line(fan, found)
     if not has_expansions(fan.body, boundary):
@@ -139,7 +139,7 @@ def _unserved(fan: RayFan) -> float:
 
 def has_expansions(body: Surface, boundary: BoundaryLike) -> bool:
     """Whether there are expansions of currents on all of a body: not round edges, nor across joints of a conductor."""
-    return not has_edges(body) and not (boundary == "pec" and is_creased(body))
+    return not has_edges(body) and not (boundary == "pec" and is_piecewise(body))
 
 
 def _expanded(fan: RayFan, lit: LitNodes, k: float, kinds: tuple[Boundary, ...]) -> SurfaceCurrents:

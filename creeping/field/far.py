@@ -32,19 +32,19 @@ from creeping.errors import SurfaceError
 from creeping.field.arguments import checked, checked_method, checked_plain, observers_of
 from creeping.field.body_currents import affordable, expected_nodes, has_expansions, kept_currents, surface_currents
 from creeping.field.boundary import BoundaryLike, scalar_boundaries
-from creeping.field.creased_far import creased_far_field, tip_waves
 from creeping.field.currents.far_sum import far_by_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation.solving import solution_for
 from creeping.field.far_geometry import far_geometry
 from creeping.field.far_rays import field_of
 from creeping.field.far_result import FarField
+from creeping.field.piecewise_far import piecewise_far_field, tip_waves
 from creeping.field.validity_range import validity
 from creeping.geometry.arguments import one_of
 from creeping.geometry.checks import unit_of
-from creeping.geometry.creased import is_creased
 from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.kept import kept
+from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
 from creeping.storage.memory import blocks, within_budget
@@ -88,7 +88,7 @@ def far_field(
         (`creeping.surface_currents`). "equation" solves it wherever it can, in minutes at high wavenumbers. The
         equation of a body with edges is that between its tiles (`creeping.solve`), which "auto" takes up to half a
         minute. A body with edges or a conductor with joints or tips whose equation is not solved has isolated rays and
-        physical optics (`creeping.field.creased_far`): "rays+optics" in the result.
+        physical optics (`creeping.field.piecewise_far`): "rays+optics" in the result.
 
     Returns
     -------
@@ -120,15 +120,15 @@ def far_field(
     k = checked(wavenumber, order)
     checked_method(method, order)
     r = observers_of(observation)
-    creased, solve = is_creased(fan.body), True if method == "equation" else None
-    serve = has_expansions(fan.body, boundary) and (order == 2 or not creased)
+    piecewise, solve = is_piecewise(fan.body), True if method == "equation" else None
+    serve = has_expansions(fan.body, boundary) and (order == 2 or not piecewise)
     auto = method == "auto" and order == 2 and len(r) > 0
     # a conductor's sums are of six columns, those of one scalar problem of one to four
     cheap = serve and auto and affordable(fan, len(kinds) * len(r), k, distant=True)
     # there are no modes of an admittance that varies
-    must = solve or (serve and (method == "currents" or (method == "auto" and kinds[0].varies and not creased)))
+    must = solve or (serve and (method == "currents" or (method == "auto" and kinds[0].varies and not piecewise)))
     currents: SurfaceCurrents | None = None
-    if auto and creased:
+    if auto and piecewise:
         # edges diffract, and currents go across joints: the equation alone knows how
         solved = solution_for(fan.body, fan.line.direction, k, boundary)
         currents = solved.currents if solved else None
@@ -140,11 +140,11 @@ def far_field(
                 raise
     if currents:
         # the equation knows of tips, expansions do not
-        left_out = tip_waves(fan, k) if creased and not currents.solved else 0.0
+        left_out = tip_waves(fan, k) if piecewise and not currents.solved else 0.0
         far = far_by_currents(currents, r, boundary, left_out=left_out)
         return replace(far, validity=validity(fan, wavenumber=k))
-    if creased:
-        far = creased_far_field(fan, r, k, boundary, order)
+    if piecewise:
+        far = piecewise_far_field(fan, r, k, boundary, order)
         return replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
     within_budget(KEPT_BYTES * len(r), f"the field in {len(r)} directions", "ask for fewer", asked=len(r))
     parts = blocks(len(r), RAY_BYTES + FAN_BYTES * k * size(fan.body))

@@ -29,11 +29,11 @@ from creeping.field.arguments import observers_of
 from creeping.field.likely_cells import RayEnds, likely_found
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.states import END, WITH_END, WITH_JACOBI
-from creeping.geometry.creased import is_creased
 from creeping.geometry.curvature import ParabolicPoints, parabolic_points
 from creeping.geometry.directions import first_of_equals
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.kept import kept
+from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface, normal, size
 from creeping.geometry.triangulation import Triangulation
 from creeping.rays.aimed import rays_towards, same_within
@@ -92,7 +92,7 @@ def far_geometry(fan: RayFan, observation: ArrayLike) -> "FarGeometry":
         tracer = RayTracer(fan.body, fan.length)
         # not the fan itself: this is kept as long as the fan lives
         line, make = fan.line, _forward_parts(fan)
-        attached = np.array([(line.fractions if is_creased(line.body) else shares_of(line))["attached"]])
+        attached = np.array([(line.fractions if is_piecewise(line.body) else shares_of(line))["attached"]])
         geometry = FarGeometry(fan.flow, launched_by(fan), tracer, r[None], attached, lambda _: (line, make()))
         _KEPT[fan] = kept = (key, geometry)
     return kept[1]
@@ -212,7 +212,7 @@ class FarGeometry:
         launch, (n, many) = self.launch, self.observers.shape[:2]
         rays = launch.arc_index.shape[1]
         times = coarse_times(self.flow, self.tracer.length)
-        lanes = WITH_END if is_creased(self.body) else WITH_JACOBI
+        lanes = WITH_END if is_piecewise(self.body) else WITH_JACOBI
         states = carried(self.flow, launch, times, components=lanes)
         # a ray that has come to an edge or tip stays there: what the search sees beyond is nothing
         ends = states[:, :, -1, END : END + 2].copy() if lanes == WITH_END else None
@@ -221,7 +221,7 @@ class FarGeometry:
         back = np.ascontiguousarray((self.angle > np.pi / 2).reshape(n, many))
         # a ray crosses about once in every half turn; at worst each sample is a cell and a crossing
         most = len(times) * PARTS
-        cells, crossings = min(CELLS[is_creased(self.body)], most * rays), 2 + int(self.tracer.steps * TURN / np.pi)
+        cells, crossings = min(CELLS[is_piecewise(self.body)], most * rays), 2 + int(self.tracer.steps * TURN / np.pi)
         arc = np.where(launch.curve_index == NO_RAY, np.nan, launch.arc_index)
         closed = np.ascontiguousarray(launch.closed)
         self.ends = RayEnds(self.tracer, launch, states, times)

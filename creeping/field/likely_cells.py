@@ -36,7 +36,7 @@ from creeping.field.creeping_modes import fock_scale, modes_of
 from creeping.field.shed_wave import shed_wave
 from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.states import M11, P, X
-from creeping.geometry.creased import tips_of
+from creeping.geometry.piecewise import tips_of
 from creeping.geometry.surface import Surface, size
 from creeping.rays.quantities import RayPoints
 from creeping.rays.reach import DECAY, LONGEST
@@ -118,7 +118,7 @@ def likely_cells(
 
     Parameters
     ----------
-    body : CreasedSurface
+    body : PiecewiseSurface
     states : (rays, K, 7 or more)
         At equal steps.
     rays : (n, 2)

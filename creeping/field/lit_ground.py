@@ -26,7 +26,7 @@ from creeping.field.currents.bounce import may_face_itself
 from creeping.field.currents.nodes import LitNodes
 from creeping.field.point_result import FieldStatus, Served, Words
 from creeping.field.ray_sums import RaySum
-from creeping.geometry.creased import is_creased
+from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
 from creeping.rays.status import RayStatus
@@ -64,7 +64,7 @@ def convex(fan: RayFan) -> bool:
     """
     if fan.line.fractions["attached"] < 1.0 or not np.all(fan.status == RayStatus.OK):
         return False
-    return is_creased(fan.body) or not may_face_itself(fan.body)
+    return is_piecewise(fan.body) or not may_face_itself(fan.body)
 
 
 def composed(

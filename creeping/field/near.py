@@ -47,7 +47,7 @@ from creeping.field.validity_range import validity
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.arguments import one_of
 from creeping.geometry.checks import unit_of
-from creeping.geometry.creased import has_edges
+from creeping.geometry.piecewise import has_edges
 from creeping.geometry.quadrature import BodyNodes, nearest_points
 from creeping.geometry.surface import Surface, normal, size
 from creeping.rays.fan import RayFan

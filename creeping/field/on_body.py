@@ -55,8 +55,8 @@ from creeping.field.validity_range import validity
 from creeping.geodesics.bundle import as_points, on_body
 from creeping.geometry.arguments import one_of
 from creeping.geometry.checks import unit_of
-from creeping.geometry.creased import is_creased
 from creeping.geometry.incident import PointSource, plane_direction
+from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.quadrature import nodes_at
 from creeping.geometry.surface import normal, size
 from creeping.rays.fan import RayFan
@@ -207,7 +207,7 @@ def total_on(
 
     ``currents`` are those of the wavenumber and boundary, if they are at hand.
     """
-    jointed, unit = is_creased(fan.body), k if kind.kind == "soft" else 1.0
+    jointed, unit = is_piecewise(fan.body), k if kind.kind == "soft" else 1.0
     # an admittance that steps is smeared by expansions, of which their currents tell
     alone = not jointed and convex(fan) and not kind.varies
     if not currents:

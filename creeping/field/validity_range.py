@@ -22,9 +22,9 @@ from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import ATTENUATION, P, X, pack
 from creeping.geodesics.tableaus import RUNGE_KUTTA_4
 from creeping.geometry.arguments import one_of
-from creeping.geometry.creased import is_creased
 from creeping.geometry.curvature import normal_curvature
 from creeping.geometry.evaluators import evaluators
+from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface, normal
 from creeping.kernels.threads import in_threads
 from creeping.rays.fan import RayFan
@@ -204,7 +204,7 @@ def validity_numbers(found: Validity) -> str:
 
 def _along_and_across(body: Surface, points: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
     """kappa_n and |kappa_t| (n,), 1/L, at points (n, 3) of rays in the directions (n, 3)."""
-    if is_creased(body):
+    if is_piecewise(body):
         return normal_curvature(body, points, directions), _across(body, points, directions)
     from creeping.geometry.kernels.nearest import normal_sections
 

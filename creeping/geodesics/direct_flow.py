@@ -10,7 +10,7 @@ from creeping.geodesics.integrator import ErrorEstimate, as_times, trace_states
 from creeping.geodesics.pieces import with_ends
 from creeping.geodesics.states import checked_states, unpack
 from creeping.geometry.arguments import checked_body, number_between, one_of, positive_number
-from creeping.geometry.creased import is_creased
+from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface
 
 
@@ -53,7 +53,7 @@ class DirectFlow(Shown):
     error: ErrorEstimate | None = None
 
     def __post_init__(self) -> None:
-        checked_body(self.body, charts=not is_creased(self.body))
+        checked_body(self.body, charts=not is_piecewise(self.body))
         object.__setattr__(self, "rtol", number_between(self.rtol, "rtol", 1e-14, 1e-2))
         object.__setattr__(self, "horizon", positive_number(self.horizon, "horizon"))
         if self.step is not None:
@@ -102,7 +102,7 @@ class DirectFlow(Shown):
         On a body with creases 14 components tell the ends of rays (`creeping.geodesics.pieces`).
         """
         states, times = checked_states(states), as_times(times)[0]
-        if is_creased(self.body):
+        if is_piecewise(self.body):
             return with_ends(self.body, states, times, rtol=self.rtol, step=self.step)
         if states.shape[1] > 10:
             return with_attenuation(self.body, states, times, rtol=self.rtol, step=self.step)

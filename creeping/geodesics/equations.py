@@ -19,10 +19,10 @@ Sources: [YC06b], [C76], [G05]; Derivations, R1 to R4.
 import numpy as np
 
 from creeping._typing import Any, FloatArray
-from creeping.geometry.creased import is_creased, pieces_of
 from creeping.geometry.curvature import curvature_norms, principal_curvature_bound, second_form
 from creeping.geometry.evaluators import speed_of, speed_values
 from creeping.geometry.kept import kept
+from creeping.geometry.piecewise import is_piecewise, pieces_of
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.triangulation import triangulate
 
@@ -35,7 +35,7 @@ def points_of_charts(body: Surface) -> FloatArray:
 
     Where a body of pieces is not trusted its curvatures are those of a fit that failed: points there are left out.
     """
-    if is_creased(body):
+    if is_piecewise(body):
         return kept(body, "points of trusted pieces", lambda: _on_pieces(body))
     samples: FloatArray | None = getattr(body, "samples", None)
     if samples is not None:
@@ -81,7 +81,7 @@ def sharpest_curvature(body: Surface) -> float:
 
     def found() -> float:
         points = points_of_charts(body)
-        if not (is_creased(body) or hasattr(body, "samples")):
+        if not (is_piecewise(body) or hasattr(body, "samples")):
             return principal_curvature_bound(body, points)
         norms = curvature_norms(body, points)
         # flat pieces alone set no scale of their own

@@ -17,8 +17,8 @@ from creeping.geodesics.bundle import bundle_states
 from creeping.geodesics.states import unpack
 from creeping.geodesics.tableaus import DORMAND_PRINCE_8, Method, dense_weights
 from creeping.geometry.arguments import checked_body, number_between, real_array
-from creeping.geometry.creased import checked_smooth
 from creeping.geometry.evaluators import evaluators
+from creeping.geometry.piecewise import checked_smooth
 from creeping.geometry.surface import Surface, size
 from creeping.kernels.threads import CHUNK, in_threads, pause
 from creeping.storage.memory import within_budget

@@ -27,7 +27,7 @@ from creeping.geodesics.bundle import project_bundle
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.own_times import trace_own
 from creeping.geodesics.states import BARE, DETACHMENT, WHOLE, P, X, cubic_at, cubics, nearest_on
-from creeping.geometry.creased import SMOOTH, nearest_crease, piece_ahead, pieces_across, pieces_of, tips_of
+from creeping.geometry.piecewise import SMOOTH, nearest_crease, piece_ahead, pieces_across, pieces_of, tips_of
 from creeping.geometry.surface import size
 
 GAP, WINDOW = 0.1, 0.3

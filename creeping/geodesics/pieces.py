@@ -14,12 +14,12 @@ from creeping._typing import Any, FloatArray
 from creeping.geodesics.piece_trace import Passages, PieceTrace
 from creeping.geodesics.piece_walk import GAP, WINDOW, Walk
 from creeping.geodesics.states import WHOLE, windows
-from creeping.geometry.creased import is_creased
+from creeping.geometry.piecewise import is_piecewise
 
 
 def passages(body: Any, states: FloatArray, length: float, *, rtol: float) -> Passages:
     """Where rays from states (n, 6) go on across joints, up to a length; nowhere on a smooth body."""
-    if not (is_creased(body) and len(states)):
+    if not (is_piecewise(body) and len(states)):
         return Passages(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64))
     return trace_pieces(body, states, np.array([length]), rtol=rtol).passages
 
@@ -47,7 +47,7 @@ def trace_pieces(
 
     Parameters
     ----------
-    body : CreasedSurface
+    body : PiecewiseSurface
     states, times
         As for `creeping.geodesics.integrator.trace_states`, which traces them on each piece.
     rtol, step

@@ -18,7 +18,7 @@ import numpy as np
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.geometry.arguments import real_array
-from creeping.geometry.creased import is_creased
+from creeping.geometry.piecewise import is_piecewise
 
 X, P = slice(0, 3), slice(3, 6)
 M11, M21, M12, M22 = range(6, 10)
@@ -65,7 +65,7 @@ def unpack(states: FloatArray, shape: tuple[int, ...], scalar: bool) -> tuple[Fl
 
 def whole_lanes(body: Any) -> int:
     """Components of a state that tell all of a ray of a body."""
-    return WITH_END if is_creased(body) else WHOLE
+    return WITH_END if is_piecewise(body) else WHOLE
 
 
 def known_steps(states: FloatArray, times: FloatArray) -> IntArray | None:

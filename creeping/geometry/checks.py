@@ -11,7 +11,7 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.errors import SurfaceError
 from creeping.geometry.arguments import checked_body
-from creeping.geometry.creased import KINDS, SAMPLE, is_creased, pieces_of, tiles_of
+from creeping.geometry.piecewise import KINDS, SAMPLE, is_piecewise, pieces_of, tiles_of
 from creeping.geometry.surface import Surface, normal, size
 from creeping.geometry.triangulation import triangulate
 
@@ -104,8 +104,8 @@ def check_surface(body: Surface) -> SurfaceReport:
     >>> report.ok, report.genus
     (True, 1)
     """
-    if is_creased(body):
-        return _creased_report(body)
+    if is_piecewise(body):
+        return _piecewise_report(body)
     checked_body(body)
     mesh = triangulate(body.level, body.gradient, body.bounds)
     points = mesh.vertices
@@ -124,7 +124,7 @@ def check_surface(body: Surface) -> SurfaceReport:
     )
 
 
-def _creased_report(body: Any) -> SurfaceReport:
+def _piecewise_report(body: Any) -> SurfaceReport:
     """Checks of a body with creases: each piece where it bounds the body, and its triangles all together."""
     checked_body(body, charts=False)
     tiles, pieces = tiles_of(body, 0.05), pieces_of(body)

@@ -28,9 +28,9 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import SurfaceError
-from creeping.geometry.creased import is_creased, nearest_crease, pieces_of, tips_of
 from creeping.geometry.kept import kept
 from creeping.geometry.patches import DEGREE, ENDS, Patches, lobatto, on_squares
+from creeping.geometry.piecewise import is_piecewise, nearest_crease, pieces_of, tips_of
 from creeping.geometry.quadrature import nearest_points
 from creeping.geometry.surface import Chart, Surface, normal, size
 from creeping.geometry.triangulation import quadrilaterals
@@ -80,7 +80,7 @@ class CoarseMesh(NamedTuple):
 
 def coarse_mesh(body: Any, share: float) -> CoarseMesh:
     """A coarse mesh of a body, of pieces with sides of a share of its size."""
-    if not is_creased(body):
+    if not is_piecewise(body):
         meshes = [quadrilaterals(body.level, body.gradient, body.bounds, cells=n, fewest=min(n, 24)) for n in CELLS]
         kinds = [len(vertices) - len(tiles) for vertices, tiles in meshes]
         vertices, tiles = meshes[kinds.index(kinds[-1])]
@@ -124,7 +124,7 @@ def _evened(body: Any, vertices: FloatArray, triangles: IntArray, pieces: IntArr
 
 def tip_vertices(body: Any, vertices: FloatArray) -> BoolArray:
     """Which vertices (n, 3) are tips (n,)."""
-    tips = tips_of(body)[1] if is_creased(body) else np.zeros((0, 3))
+    tips = tips_of(body)[1] if is_piecewise(body) else np.zeros((0, 3))
     apart = np.linalg.norm(vertices[:, None] - tips, axis=2)
     return np.asarray(np.min(apart, axis=1, initial=np.inf) < 1e-6 * size(body))
 
@@ -203,7 +203,7 @@ def patches_of(body: Surface) -> Patches:
 def _made(body: Surface) -> Patches | str:
     """The squares, or why there are none."""
     ground, best, least = _Ground(body), None, np.inf
-    charts = () if is_creased(body) else getattr(body, "tiling", ())
+    charts = () if is_piecewise(body) else getattr(body, "tiling", ())
     if charts:
         found = _of_charts(ground, charts)
         if np.max(found.off) < WORST * ground.size:
@@ -212,7 +212,7 @@ def _made(body: Surface) -> Patches | str:
     if hasattr(body, "squares"):
         vertices, places, corners, pieces = body.squares(lobatto(DEGREE))
         return _refined(ground, CoarseMesh(vertices, corners, pieces, places))
-    for share in SIDES_OF_PIECES if is_creased(body) else (0.0,):
+    for share in SIDES_OF_PIECES if is_piecewise(body) else (0.0,):
         try:
             found = _refined(ground, coarse_mesh(body, share))
         except (SurfaceError, ValueError) as error:
@@ -256,8 +256,8 @@ class _Ground:
 
     def __init__(self, body: Any) -> None:
         self.body, self.size = body, size(body)
-        self.pieces = list(pieces_of(body)) if is_creased(body) else [body]
-        self.creases = body.creases if is_creased(body) else ()
+        self.pieces = list(pieces_of(body)) if is_piecewise(body) else [body]
+        self.creases = body.creases if is_piecewise(body) else ()
 
     def onto(self, points: FloatArray, pieces: IntArray) -> FloatArray:
         """The nearest points (n, 3) of the pieces with these numbers (n,)."""
@@ -483,7 +483,7 @@ def _half(ground: _Ground, patches: Patches, right: bool | None, upper: bool | N
     x[pointed, 0] = patches.places[pointed, :1, 0]
     inner = np.array([right is True, right is False, upper is True, upper is False])
     edges = patches.edges & ~inner
-    for side in np.flatnonzero(inner if is_creased(ground.body) else np.ones(4, dtype=bool)):
+    for side in np.flatnonzero(inner if is_piecewise(ground.body) else np.ones(4, dtype=bool)):
         free = np.flatnonzero(~(pointed & (side == 0)))
         rows = (x[:, 0], x[:, -1], x[:, :, 0], x[:, :, -1])[side]
         middle = rows[free][:, 1:-1]

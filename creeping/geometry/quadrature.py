@@ -25,11 +25,11 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import SurfaceError
-from creeping.geometry.creased import Tiles, is_creased, pieces_of
 from creeping.geometry.curvature import adjugate_form, second_form
 from creeping.geometry.evaluators import entries_of, evaluators
 from creeping.geometry.kept import kept
 from creeping.geometry.parts import inside
+from creeping.geometry.piecewise import Tiles, is_piecewise, pieces_of
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.tile_rules import CLOSED, FEWEST, MOST, MOST_CELLS, MOST_NODES, PieceRules, Rules, finer, graded
 from creeping.kernels.threads import in_slices
@@ -140,7 +140,7 @@ def body_nodes(body: Surface, rate: float) -> BodyNodes:
     >>> round(float(nodes.weights.sum()), 6), round(float(4 * np.pi**2 * 0.5), 6)
     (19.739209, 19.739209)
     """
-    if is_creased(body):
+    if is_piecewise(body):
         return _on_pieces(body, rate)
     found = kept(body, "quadratures", lambda: Rules(body, _nodes))
     while found.cells:
@@ -173,7 +173,7 @@ def node_count(body: Surface, rate: float) -> int:
     >>> node_count(ball, 20.0) == len(body_nodes(ball, 20.0).points)
     True
     """
-    if is_creased(body):
+    if is_piecewise(body):
         return _piece_rules(body).rule(body, rate)[2]
     found = kept(body, "quadratures", lambda: Rules(body, _nodes))
     if not found.cells:

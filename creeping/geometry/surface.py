@@ -144,7 +144,7 @@ class Crease(Protocol):
 
 
 @runtime_checkable
-class CreasedSurface(Surface, Protocol):
+class PiecewiseSurface(Surface, Protocol):
     """A closed body of smooth pieces: its ``level`` is on each piece that of the piece, and jumps between them.
 
     Each piece is a `Surface` in its own right, smooth where it bounds the body and a little beyond; of it only
@@ -273,7 +273,7 @@ def fingerprint(body: Surface) -> str:
         text = repr([each, several.turns.tolist(), several.shifts.tolist()])
         return f"{type(body).__name__}:{hashlib.blake2b(text.encode(), digest_size=16).hexdigest()}"
     points: FloatArray
-    if isinstance(body, CreasedSurface) and len(body.creases):
+    if isinstance(body, PiecewiseSurface) and len(body.creases):
         # charts are not asked of a body with creases; between the corners of its tiles, as F jumps at creases
         points = np.asarray(body.tiles(0.25 * size(body))[0].mean(axis=1))
     else:

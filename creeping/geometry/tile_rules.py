@@ -34,8 +34,8 @@ from functools import lru_cache
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
-from creeping.geometry.creased import Tiles, pieces_of, tiles_of
 from creeping.geometry.curvature import principal_curvature_bound
+from creeping.geometry.piecewise import Tiles, pieces_of, tiles_of
 from creeping.geometry.surface import Surface, normal, project, size
 from creeping.geometry.triangulation import quadrilaterals
 

@@ -17,9 +17,9 @@ import numpy as np
 
 from creeping._typing import Any, ArrayLike, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.geometry.creased import drawn_mesh
 from creeping.geometry.directions import unit_direction
 from creeping.geometry.incident import PointSource
+from creeping.geometry.piecewise import drawn_mesh
 from creeping.geometry.surface import Surface, normal, size
 from creeping.geometry.triangulation import Triangulation
 from creeping.plotting._strokes import LevelColours, Stroke, strokes

@@ -21,7 +21,7 @@ from creeping.field.comparison import decibels
 from creeping.field.labelled import power
 from creeping.field.point_result import FieldStatus, PointField
 from creeping.field.ports.port_map import PortField, port_field
-from creeping.geometry.creased import drawn_mesh
+from creeping.geometry.piecewise import drawn_mesh
 from creeping.geometry.surface import Surface, normal, project, size
 from creeping.geometry.triangulation import Triangulation
 from creeping.plotting._drawing import Drawing, View, shadow_view

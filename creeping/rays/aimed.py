@@ -14,8 +14,8 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geodesics.states import P, X
-from creeping.geometry.creased import is_creased
 from creeping.geometry.curvature import second_form
+from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import normal, size
 from creeping.rays.quantities import STRAIGHT, RayPoints
 from creeping.rays.reach import SingleRays
@@ -76,9 +76,9 @@ def rays_towards(
     """
     missing, parts = np.arange(len(times)), []
     together = np.ones(len(times), dtype=np.int64) if together is None else together
-    creased = is_creased(tracer.body)
-    levels = (1,) if creased else LONG
-    longest = np.full(len(times), STEP_ON_PIECES) if creased else np.where(together > CROWDED, STEP, np.inf)
+    piecewise = is_piecewise(tracer.body)
+    levels = (1,) if piecewise else LONG
+    longest = np.full(len(times), STEP_ON_PIECES) if piecewise else np.where(together > CROWDED, STEP, np.inf)
     for number, long in enumerate(levels):
         if number and not len(missing):
             break
@@ -126,11 +126,11 @@ class _Search:
         self.starts, self.tangents = tracer.onto_line(near, directions)
         self.times, self.begin, self.moved = times.copy(), times, np.zeros(n)
         self.ends, self.on = np.empty((n, 8)), np.full(n, -1)
-        self.creased = is_creased(tracer.body)
-        self.wide = np.maximum(cell, LEAST_CELL * size(tracer.body)) if self.creased else cell
-        self.far = FAR_ON_PIECES if self.creased else FAR
+        self.piecewise = is_piecewise(tracer.body)
+        self.wide = np.maximum(cell, LEAST_CELL * size(tracer.body)) if self.piecewise else cell
+        self.far = FAR_ON_PIECES if self.piecewise else FAR
         trusted = np.isinf(longest)
-        patience = np.where(trusted, ROUNDS, IDLE_ON_PIECES if self.creased else IDLE)
+        patience = np.where(trusted, ROUNDS, IDLE_ON_PIECES if self.piecewise else IDLE)
         idle, best = np.zeros(n, dtype=np.int64), np.full(n, np.inf)
         active, self.wanted = np.arange(n), np.zeros(n, dtype=bool)
         for number in range(ROUNDS):
@@ -153,11 +153,11 @@ class _Search:
     def result(self) -> tuple[SingleRays, IntArray]:
         """Exact rays that have been found, and their rows."""
         kept = np.flatnonzero(self.wanted & self._within())
-        if self.creased:
+        if self.piecewise:
             kept = self._close(kept)
         rows = self.directions[kept], self.starts[kept], self.tangents[kept], self.times[kept]
         found = self.tracer.at(*rows, observers=self.observers[kept])
-        if self.creased:
+        if self.piecewise:
             self._ended(kept, found.rays)
         good = (_apart(found.rays.directions, self.observers[kept]) < ACCEPTED) & self._within(kept)
         return found[good], kept[good]
@@ -178,7 +178,7 @@ class _Search:
     def _off(self, some: IntArray, long: int = 1) -> FloatArray:
         """|r - p| (n,) where some searches are now, on a smooth body with steps of so many."""
         rows = self.directions[some], self.starts[some], self.tangents[some], self.times[some]
-        if self.creased:
+        if self.piecewise:
             self.ends[some] = self.tracer.ends(rows[0], rows[1], rows[3])
         else:
             self.ends[some] = self.tracer.at(*rows, long=long).rays.lanes[:, :8]
@@ -186,7 +186,7 @@ class _Search:
 
     def _crossed(self, some: IntArray) -> BoolArray:
         """Which of some searches have come to another piece since they were asked last."""
-        if not self.creased:
+        if not self.piecewise:
             return np.zeros(len(some), dtype=bool)
         body: Any = self.tracer.body
         before, self.on[some] = self.on[some], body.piece(self.ends[some, X])

@@ -24,7 +24,7 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.geodesics.states import CREASE, DETACHMENT, END, WHOLE, X
-from creeping.geometry.creased import is_creased, nearest_crease
+from creeping.geometry.piecewise import is_piecewise, nearest_crease
 from creeping.geometry.surface import Surface, size
 from creeping.rays.status import RayStatus
 from creeping.shadow.attachment import Arc, LaunchPoints
@@ -84,7 +84,7 @@ def ends_of(
 def _refused(body: Any, path: FloatArray, times: FloatArray, met: FloatArray) -> IntArray:
     """Status (rays,) of rays that come at times ``met`` to what is not smooth enough: a body with creases says why."""
     out = np.full(len(met), int(RayStatus.NON_SMOOTH))
-    if not is_creased(body):
+    if not is_piecewise(body):
         return out
     rows = np.flatnonzero(np.isfinite(met))
     places = np.array([[np.interp(met[row], times, path[row, :, axis]) for axis in range(3)] for row in rows])

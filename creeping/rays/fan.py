@@ -29,10 +29,10 @@ from creeping.geodesics.pieces import passages, trace_pieces
 from creeping.geodesics.states import ATTENUATION, P, X, known_steps, pack, whole_lanes
 from creeping.geometry.arguments import flag, one_of, real_number, whole_number
 from creeping.geometry.checks import unit_of
-from creeping.geometry.creased import has_edges, is_creased
 from creeping.geometry.curvature import gaussian_curvature, normal_curvature
 from creeping.geometry.evaluators import speed_of, speed_values
 from creeping.geometry.kept import kept
+from creeping.geometry.piecewise import has_edges, is_piecewise
 from creeping.geometry.surface import Surface, fingerprint, size
 from creeping.rays.ends import Losses, Starts, ends_of, outline_share
 from creeping.rays.reach import AUTO, HARD_DECAY, IN_RANGE, ray_length
@@ -391,7 +391,7 @@ def end_error(fan: RayFan) -> ErrorEstimate:
     # a thousandth of what is to be measured
     rms = np.nan if fan.flow.error is None else fan.flow.error.rms
     rtol = float(np.clip(1e-3 * rms, 1e-12, 1e-9)) if np.isfinite(rms) and rms > 0 else 1e-12
-    trace = trace_states if not is_creased(fan.body) else lambda *rays, rtol: trace_pieces(*rays, rtol=rtol).states
+    trace = trace_states if not is_piecewise(fan.body) else lambda *rays, rtol: trace_pieces(*rays, rtol=rtol).states
     exact = trace(fan.body, first, np.array([fan.length]), rtol=rtol)[:, 0]
     error = np.linalg.norm(np.concatenate([fan.points[chosen, -1], fan.directions[chosen, -1]], axis=1) - exact, axis=1)
     return ErrorEstimate(float(np.sqrt(np.mean(error**2))), float(error.max()), len(chosen))

@@ -26,8 +26,8 @@ from creeping.errors import InvalidInputError
 from creeping.geodesics.equations import vector_field
 from creeping.geometry.arguments import flag, one_of, real_array
 from creeping.geometry.checks import UNKNOWN, unit_of
-from creeping.geometry.creased import is_creased
 from creeping.geometry.evaluators import speed_of, speed_values
+from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import project
 from creeping.rays.fan import RayFan
 from creeping.rays.status import AT_CREASES
@@ -169,7 +169,7 @@ def iso_phase_curves(
 
 def _whole_steps(fan: RayFan) -> FloatArray:
     """Travel time up to which the steps of each ray are whole (rays,): one that has come to an edge stays there."""
-    moving = np.any(np.diff(fan.points, axis=1) != 0, axis=2) if is_creased(fan.body) else np.ones((0, 0), dtype=bool)
+    moving = np.any(np.diff(fan.points, axis=1) != 0, axis=2) if is_piecewise(fan.body) else np.ones((0, 0), dtype=bool)
     out = np.full(len(fan.points), fan.length)
     for ray in np.flatnonzero(~moving[:, -1]) if moving.size else ():
         out[ray] = fan.travel_time[max(int(np.sum(moving[ray])) - 1, 0)]

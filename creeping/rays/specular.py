@@ -20,8 +20,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
-from creeping.geometry.creased import SMOOTH, nearest_crease, pieces_of, tiles_of
 from creeping.geometry.directions import first_of_equals
+from creeping.geometry.piecewise import SMOOTH, nearest_crease, pieces_of, tiles_of
 from creeping.geometry.surface import Surface, normal, project, size
 from creeping.geometry.triangulation import Triangulation, triangulate
 from creeping.shadow.attachment import occluded

@@ -19,8 +19,8 @@ from creeping.geodesics.equations import sharpest_curvature
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.pieces import trace_pieces, trace_to
 from creeping.geodesics.states import M11, M12, M21, M22, P, X, pack
-from creeping.geometry.creased import is_creased, piece_ahead, pieces_of
 from creeping.geometry.evaluators import evaluators, speed_of
+from creeping.geometry.piecewise import is_piecewise, piece_ahead, pieces_of
 from creeping.geometry.surface import Surface, size
 from creeping.rays.ends import non_smooth_from
 from creeping.rays.quantities import GAUSS, GUARD, LANES, START_LANES, RayPoints
@@ -65,7 +65,7 @@ class RayTracer:
     def onto_line(self, points: FloatArray, directions: FloatArray, steps: int = 4) -> tuple[FloatArray, FloatArray]:
         """Points of the shadow lines next to the given ones, and T there: (n, 3), (n, 3)."""
         reach = 0.1 * size(self.body)
-        if not is_creased(self.body):
+        if not is_piecewise(self.body):
             points, tangents, _ = moved_onto_lines(self.body, directions, points, reach=reach, steps=steps)
             return points, tangents
         points, tangents = points.copy(), np.zeros_like(points)
@@ -162,7 +162,7 @@ class RayTracer:
         rank = np.empty(rays, dtype=np.int64)
         rank[order] = np.arange(rays)
         place = np.argsort(rank[owner], kind="stable")
-        together = TOGETHER_ON_PIECES if is_creased(self.body) else TOGETHER
+        together = TOGETHER_ON_PIECES if is_piecewise(self.body) else TOGETHER
         ends = np.searchsorted(rank[owner][place], np.arange(0, rays + together, together))
         with evaluators(self.body) as parts:
             evaluator = parts[:2]
@@ -189,7 +189,7 @@ class RayTracer:
                     np.zeros(len(rows), dtype=bool),
                     np.zeros(len(rows), dtype=bool),
                 )
-                joints = is_creased(self.body)
+                joints = is_piecewise(self.body)
                 quantities_at(*evaluator, *self._rule, scale, states, step, which, now, whole, joints, seen, *out)
                 times[rows] = now
                 lanes[rows], first[rows], alive[rows], risen[rows] = out
@@ -209,7 +209,7 @@ class RayTracer:
 
     def _traced(self, states: FloatArray, times: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
         """Rays at equal steps, beyond an edge or tip as if their piece went on, for the polynomials' sake; and ends."""
-        if is_creased(self.body):
+        if is_piecewise(self.body):
             found = trace_pieces(self.body, states, times, rtol=RTOL, beyond=(GUARD + 2) * step)
             return found.states, found.end
         return trace_states(self.body, states, times, rtol=0.0, step=step), np.full(len(states), np.inf)

@@ -22,9 +22,9 @@ from creeping.geodesics.equations import launch_spreading
 from creeping.geodesics.integrator import ErrorEstimate
 from creeping.geodesics.states import M11, M12, M21, M22, P, X, pack
 from creeping.geometry.arguments import checked_body, shown
-from creeping.geometry.creased import is_creased
 from creeping.geometry.evaluators import speed_of, speed_values
 from creeping.geometry.incident import headings
+from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface
 from creeping.kernels.threads import CHUNK
 from creeping.shadow.attachment import LaunchPoints
@@ -65,7 +65,7 @@ def checked_flow(flow: Flow) -> None:
         raise InvalidInputError(
             f"flow = {shown(flow)} is no flow; make one by creeping.build_phase_map, DirectFlow or choose_flow"
         )
-    checked_body(flow.body, charts=not is_creased(flow.body))
+    checked_body(flow.body, charts=not is_piecewise(flow.body))
 
 
 def carried(flow: Flow, launch: LaunchPoints, times: FloatArray, *, components: int) -> FloatArray:

@@ -21,17 +21,17 @@ from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.geometry.arguments import checked_body, whole_number
 from creeping.geometry.checks import unit_of
-from creeping.geometry.creased import is_creased
 from creeping.geometry.evaluators import speed_of
 from creeping.geometry.incident import Incident, PointSource, incident_of, plane_direction
+from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface, normal, size
 from creeping.shadow.attachment import Arc, LaunchPoints
-from creeping.shadow.creased import creased_curves, launched_from
 from creeping.shadow.curve import ShadowCurve, counted, interpolated, spelled
 from creeping.shadow.edges import EdgePart
 from creeping.shadow.following import followed
 from creeping.shadow.nodes import Finished, LineNodes, clearance, finished, line_nodes, polished
 from creeping.shadow.panels import PanelCurve
+from creeping.shadow.piecewise import launched_from, piecewise_curves
 from creeping.shadow.status import NEAR_SINGULAR, STATUSES
 from creeping.storage.memory import within_budget
 
@@ -126,7 +126,7 @@ class ShadowLine(DrawnOnBody):
         checked_launch_from(launch_from)
         n_rays = whole_number(n_rays, "n_rays", 0)
         within_budget(400.0 * n_rays, f"{n_rays} rays", "ask for fewer")
-        if is_creased(self.body):
+        if is_piecewise(self.body):
             return launched_from(self.curves, self.arcs(launch_from), self.direction, n_rays)
         found = finished(self.body, self.wave, self.nodes, n_rays, every=launch_from == "all")
         return LaunchPoints.unpacked(self.wave[None], found.launched[None], found.places[None])
@@ -199,8 +199,8 @@ def shadow_line(
     incident = incident_of(direction, source)
     n_points = whole_number(n_points, "n_points", 16)
     within_budget(150.0 * n_points, f"{n_points} points of the shadow line", "ask for fewer")
-    if is_creased(body):
-        return _creased_line(body, incident, n_points)
+    if is_piecewise(body):
+        return _piecewise_line(body, incident, n_points)
     if isinstance(incident, PointSource):
         _checked_height(body, incident)
     d = incident.row(body)
@@ -241,7 +241,7 @@ def _checked_height(body: Surface, source: PointSource) -> None:
         )
 
 
-def _creased_line(body: Surface, source: Incident, n_points: int) -> ShadowLine:
+def _piecewise_line(body: Surface, source: Incident, n_points: int) -> ShadowLine:
     if isinstance(source, PointSource):
         raise InvalidInputError(
             f"{brief(body)} has creases: the shadow line of a point source is that of a smooth body; give a PlaneWave"
@@ -249,7 +249,7 @@ def _creased_line(body: Surface, source: Incident, n_points: int) -> ShadowLine:
     direction = np.array(source.direction)
     if speed_of(body) is not None:
         raise InvalidInputError(f"{brief(body)} has creases and a speed; give a body with one or the other")
-    curves, on_edges, at_tips, edge_on = creased_curves(body, direction, n_points)
+    curves, on_edges, at_tips, edge_on = piecewise_curves(body, direction, n_points)
     parts = [curve.line_nodes() for curve in curves]
     nodes = LineNodes(
         points=np.concatenate([np.zeros((3, 0)), *(part.points for part in parts)], axis=1),

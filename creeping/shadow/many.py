@@ -16,17 +16,17 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import SingularIncidenceError
-from creeping.geometry.creased import is_creased
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.incident import rows_of
+from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface
 from creeping.kernels.threads import in_threads
 from creeping.shadow.attachment import LaunchPoints
-from creeping.shadow.creased import launched_from
 from creeping.shadow.following import followed
 from creeping.shadow.line import ShadowLine, shadow_line
 from creeping.shadow.meshes import LineMeshes
 from creeping.shadow.nodes import FORBIDDEN, box_of, critical_distances, finished, judged, prepared
+from creeping.shadow.piecewise import launched_from
 from creeping.shadow.status import FOLLOWED, NO_RAY, OK, SINGULAR
 
 LEAST = 8
@@ -91,7 +91,7 @@ def shadow_lines(body: Surface, directions: FloatArray, n_rays: int, *, every: b
     """
     from creeping.shadow.kernels.trace import LAUNCHED, SUMMARY, trace_lines
 
-    if is_creased(body):
+    if is_piecewise(body):
         return _one_by_one(body, np.asarray(directions, dtype=float), n_rays, every)
     directions = np.ascontiguousarray(directions, dtype=float)
     n, waves = len(directions), rows_of(directions)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray
-from creeping.geometry.creased import Tiles, nearest_crease, piece_ahead, tips_of
+from creeping.geometry.piecewise import Tiles, nearest_crease, piece_ahead, tips_of
 from creeping.geometry.surface import size
 from creeping.shadow.panels import newton_step, onto_line
 

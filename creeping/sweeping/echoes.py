@@ -19,9 +19,9 @@ from creeping.field.boundary import BoundaryLike
 from creeping.field.echo import Echo
 from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geometry.arguments import checked_body, real_array, real_number, shown, whole_number
-from creeping.geometry.creased import is_creased
 from creeping.geometry.directions import azimuth_elevation_of, directions_from_azimuth_elevation
 from creeping.geometry.parts import why_no_rays
+from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface, size
 from creeping.phaseflow.tuning.flow_choice import choose_flow
 from creeping.rays.fan import launch
@@ -163,7 +163,7 @@ def seconds_of_currents(
 
     ``azimuths``, ``elevations`` (n,), degrees, are the radar's; ``observers`` directions belong to each.
     """
-    if is_creased(body) or why_no_rays(body):
+    if is_piecewise(body) or why_no_rays(body):
         return 0.0
     radar = directions_from_azimuth_elevation(np.radians(azimuths[0]), np.radians(elevations[0]))
     try:
@@ -199,7 +199,7 @@ def _swept(
 ) -> xarray.Dataset:
     """Sweep of checked arguments."""
     if not why_no_rays(body):
-        checked_body(body, charts=not is_creased(body))
+        checked_body(body, charts=not is_piecewise(body))
     checked_plain(body)
     checked_method(asked["method"], 2)
     asked["n_rays"] = whole_number(asked["n_rays"], "n_rays")

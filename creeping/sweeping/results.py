@@ -16,8 +16,8 @@ from creeping._typing import Any, FloatArray, IntArray
 from creeping._version import __version__
 from creeping.field.labelled import COMPONENTS, power
 from creeping.geometry.checks import UNKNOWN, unit_of
-from creeping.geometry.creased import is_creased
 from creeping.geometry.directions import angles_of
+from creeping.geometry.piecewise import is_piecewise
 from creeping.shadow.status import INCIDENCE_STATUSES
 from creeping.storage.memory import required
 from creeping.sweeping.plan import Arrays, SweepPlan
@@ -129,7 +129,7 @@ def sweep_attributes(plan: SweepPlan, unit: str) -> dict[str, Any]:
     }
     if request.quantity != "rays":
         words |= {"boundaries": ", ".join(request.boundaries), "order_of_creeping_waves": int(request.order)}
-        if is_creased(plan.body):
+        if is_piecewise(plan.body):
             words["served_by"] = SERVED
     for name, value in flow.items():
         if name != "error" and value is not None:

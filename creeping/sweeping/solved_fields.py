@@ -115,7 +115,7 @@ class SolvedSweeper:
         return out
 
 
-def creased_lines(
+def piecewise_lines(
     body: Surface, directions: FloatArray, n_rays: int
 ) -> tuple[tuple[ShadowLine | None, ...], ShadowLines]:
     """Lines of unit directions (n, 3), None where one crosses itself, and what sweeps say of them."""
@@ -128,7 +128,7 @@ def creased_lines(
     return tuple(lines), lines_together(directions, lines, n_rays)
 
 
-def fill_creased(
+def fill_piecewise(
     flow: Flow,
     request: SweepRequest,
     lines: tuple[ShadowLine | None, ...],

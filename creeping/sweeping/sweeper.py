@@ -16,7 +16,7 @@ from creeping.field.far_result import FarField
 from creeping.field.validity_range import launch_validity, validities
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.states import ATTENUATION, P, X, whole_lanes
-from creeping.geometry.creased import is_creased
+from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan, launch, ray_arrays
 from creeping.rays.reach import early_length
@@ -27,7 +27,7 @@ from creeping.shadow.line import ShadowLine, shadow_line
 from creeping.shadow.many import ShadowLines, shadow_lines
 from creeping.shadow.status import SINGULAR
 from creeping.sweeping.request import CURVED, VALID, SweepRequest
-from creeping.sweeping.solved_fields import FieldArrays, creased_lines, fill_creased
+from creeping.sweeping.solved_fields import FieldArrays, fill_piecewise, piecewise_lines
 
 BATCH, FIELD_BATCH = 16_384, 65_536
 """Rays carried at a time, so that what is known of them stays in the caches; fields are assembled by many calls on few
@@ -72,7 +72,7 @@ class Sweeper:
     def __init__(self, flow: Flow, request: SweepRequest) -> None:
         self.flow, self.request = flow, request
         self.passed: Passed = lambda _: None
-        self._one_by_one = request.quantity != "rays" and is_creased(flow.body)
+        self._one_by_one = request.quantity != "rays" and is_piecewise(flow.body)
         together = request.quantity != "rays" and not self._one_by_one
         self._tracer = RayTracer(flow.body, request.length) if together else None
         self._early = 0.0
@@ -107,9 +107,9 @@ class Sweeper:
 
     def _batch(self, incidences: FloatArray, out: dict[str, Any], passed: Passed) -> Made | None:
         if self._one_by_one:
-            found, lines = creased_lines(self.body, incidences, self.request.n_rays)
+            found, lines = piecewise_lines(self.body, incidences, self.request.n_rays)
             fill_lines(lines, out)
-            fill_creased(self.flow, self.request, found, out, passed)
+            fill_piecewise(self.flow, self.request, found, out, passed)
             return None
         lines = shadow_lines(self.body, incidences, self.request.n_rays)
         fill_lines(lines, out)

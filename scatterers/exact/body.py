@@ -137,7 +137,7 @@ class Piece(Levelled):
         return NoCharts("a piece of a body goes beyond its edge: no charts cover it; take the tiles of the body")
 
 
-class CreasedBody(Levelled, Body):
+class PiecewiseBody(Levelled, Body):
     """Base of bodies of pieces; a subclass gives ``compiled``, ``bounds``, ``pieces``, ``creases``, ``tiles``."""
 
     @property

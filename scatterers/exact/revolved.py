@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.base.level_body import positive
-from scatterers.exact.body import SHARP, CreasedBody, NoCharts, Piece
+from scatterers.exact.body import SHARP, NoCharts, Piece, PiecewiseBody
 from scatterers.exact.profile import Segment
 from scatterers.kernels.compiled import Compiled
 from scatterers.kernels.revolved import ROWS, SPLINE, WIDTH, evaluate, numbers
@@ -143,7 +143,7 @@ def _cuts(segment: Segment) -> FloatArray:
     return np.concatenate([[0.0], inner, [1.0]])
 
 
-class Revolved(CreasedBody):
+class Revolved(PiecewiseBody):
     """Base of bodies with a profile; a subclass gives ``_profile``, and where it is placed."""
 
     # the axes of space that are u, v and w, and v over that coordinate

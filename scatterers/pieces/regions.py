@@ -106,7 +106,7 @@ def regions_of(
     (3, [True, True])
     """
     turns = _turns(vertices, triangles)
-    crease = _chained(turns, _creased(turns, len(triangles)) if sharp is None else sharp, len(vertices))
+    crease = _chained(turns, _piecewise(turns, len(triangles)) if sharp is None else sharp, len(vertices))
     level = np.zeros_like(crease) if level is None else level & ~crease
     bounds = crease | level
     return Regions(_connected(len(triangles), turns.sides[~bounds]), turns, bounds, level)
@@ -132,7 +132,7 @@ def _turns(vertices: FloatArray, triangles: IntArray) -> Turns:
     return Turns(edges.ends, sides, np.where(thin & (np.abs(turn) < ALWAYS), 0.0, turn))
 
 
-def _creased(turns: Turns, count: int) -> BoolArray:
+def _piecewise(turns: Turns, count: int) -> BoolArray:
     """Edges at which no smooth surface goes through the triangles."""
     size = np.abs(turns.turn)
     sharp = ((size > SHARP) & (size > 3 * np.median(size))) | (size > ALWAYS)

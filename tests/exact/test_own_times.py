@@ -2,7 +2,7 @@
 
 import numpy as np
 import shared_bodies as sc
-from creased_bodies import Ball
+from piecewise_bodies import Ball
 
 import creeping as cr
 from creeping.field.likely_cells import parted

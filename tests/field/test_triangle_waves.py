@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from creeping.field.creased_far import phase_sums
+from creeping.field.piecewise_far import phase_sums
 
 K = 7.0
 

@@ -5,8 +5,8 @@ import pytest
 
 import scatterers as sc
 from creeping.errors import SurfaceError
-from creeping.geometry.creased import Tiles, pieces_across
 from creeping.geometry.curvature import gaussian_curvature
+from creeping.geometry.piecewise import Tiles, pieces_across
 from creeping.geometry.quadrature import body_nodes, node_count
 from creeping.geometry.surface import size
 from creeping.geometry.tile_rules import BEND, graded

@@ -5,7 +5,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.geometry.creased import drawn_mesh
+from creeping.geometry.piecewise import drawn_mesh
 from creeping.plotting import coupling_picture
 from creeping.plotting.coupling_pictures import coupling_levels, front_strokes
 

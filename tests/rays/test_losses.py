@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import shared_bodies as sc
-from creased_bodies import cut_sphere
+from piecewise_bodies import cut_sphere
 
 import creeping as cr
 from creeping.rays.reach import HARD_DECAY

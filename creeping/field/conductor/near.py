@@ -49,7 +49,7 @@ from creeping.field.validity_range import validity
 from creeping.geodesics.bundle import as_points, on_body
 from creeping.geometry.arguments import one_of
 from creeping.geometry.checks import unit_of
-from creeping.geometry.creased import is_creased
+from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import normal
 from creeping.rays.fan import RayFan
 from creeping.rays.shedding import ShedRays, free_ways, shed_near
@@ -236,7 +236,7 @@ def _left_inside(
 
     And whether nothing but they will do.
     """
-    alone = method == "equation" or is_creased(fan.body)
+    alone = method == "equation" or is_piecewise(fan.body)
     if alone:
         currents = _currents(fan, k, mix, solve=True if method == "equation" else None)
         return np.max(currents.left_of_each, axis=0), currents, alone

@@ -29,7 +29,7 @@ from creeping.field.currents.lit import lit_currents
 from creeping.field.marching.fan_waves import fan_waves, march_alone, marchable, spread_out
 from creeping.field.shed_wave import smoothstep
 from creeping.field.surface import surface_waves
-from creeping.geometry.creased import is_creased, piece_ahead, pieces_of
+from creeping.geometry.piecewise import is_piecewise, piece_ahead, pieces_of
 from creeping.geometry.quadrature import BodyNodes, body_nodes, nearest_points, nodes_at
 from creeping.geometry.surface import Surface, normal, size
 from creeping.rays.fan import RayFan, launch
@@ -200,7 +200,7 @@ def radius_rates(
 
     Next to a joint those of its own piece.
     """
-    if is_creased(body):
+    if is_piecewise(body):
         rate, bend = np.empty((2, len(points)))
         numbers = piece_ahead(body, points, np.zeros(3))
         for number in np.unique(numbers):
@@ -227,7 +227,7 @@ def ray_nodes(fan: RayFan, wavenumber: float, boundary: Boundary) -> RayNodes:
     wavelength = 2 * np.pi / wavenumber
     attached = sum(curve.length for curve in fan.line.curves) * fan.line.fractions["attached"]
     # marches ask for some rays on each arc, and arcs of bodies of pieces are many and short
-    fewest = 96 if is_creased(fan.body) else 16
+    fewest = 96 if is_piecewise(fan.body) else 16
     n_rays = max(fewest, int(np.ceil(RAYS * attached / wavelength)))
     dense = launch(fan.flow, fan.line, length=length, n_rays=n_rays, max_gap=GAP * wavelength, measured=False)
     times = np.linspace(0.0, length, max(16, int(np.ceil(STEPS * length / wavelength))) + 1)

@@ -21,10 +21,10 @@ from creeping.errors import SurfaceError
 from creeping.field.boundary import Boundary
 from creeping.field.equation.tiles import POINTS, SIDE, VARYING, Tiles, tiles_for, tiles_of
 from creeping.geometry.covering import patches_of
-from creeping.geometry.creased import is_creased
 from creeping.geometry.kept import kept
 from creeping.geometry.parts import inside, is_faceted, why_no_rays
 from creeping.geometry.patches import SHARP, Patches, chordal, facet_patches, halved, own_triangles, sides_of, turns_of
+from creeping.geometry.piecewise import is_piecewise
 
 CHEAP = 4000
 """Nodes up to which those of five a side serve: of a body that is small against the wavelength it is its own shape that
@@ -45,7 +45,7 @@ def body_tiles(body: Any, wavenumber: float, boundary: Boundary, *, finest: bool
         return facet_tiles(body, wavenumber, boundary, finest=finest)
     if why_no_rays(body):
         return _joined(body, [body_tiles(part, wavenumber, boundary, finest=True) for part in body.parts])
-    facets = kept(body, "own triangles", lambda: own_triangles(body)) if is_creased(body) else None
+    facets = kept(body, "own triangles", lambda: own_triangles(body)) if is_piecewise(body) else None
     if facets is not None and facets.flat:
         return facet_tiles(facets, wavenumber, boundary, finest=finest)
     try:

@@ -37,8 +37,8 @@ from creeping.field.equation.matrix import Matrix, Places
 from creeping.field.equation.tiles import Tiles, gauss
 from creeping.field.far_result import spherical_frame
 from creeping.geodesics.bundle import as_points
-from creeping.geometry.creased import is_convex, is_creased
 from creeping.geometry.parts import is_faceted, why_no_rays
+from creeping.geometry.piecewise import is_convex, is_piecewise
 from creeping.geometry.quadrature import box_points
 from creeping.geometry.surface import Surface, size
 from creeping.shadow.attachment import occluded
@@ -101,7 +101,7 @@ def scattered_electric(matrix: Matrix, points: FloatArray, J: ComplexArray, q: C
 def lit_ground(body: Any, points: FloatArray, normals: FloatArray, direction: FloatArray) -> BoolArray:
     """Whether the wave comes straight to points of the body with normals (m, 3): (m,)."""
     lit = np.asarray(normals @ direction < 0)
-    if not (is_creased(body) and is_convex(body)):
+    if not (is_piecewise(body) and is_convex(body)):
         above = points[lit] + ABOVE * size(body) * normals[lit]
         lit[lit] = ~_hidden(body, above, direction)
     return lit

@@ -30,9 +30,9 @@ from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
 from creeping.field.equation.matrix import EACH, VECTOR
 from creeping.field.equation.solution import Solution
 from creeping.geodesics.equations import points_of_charts
-from creeping.geometry.creased import is_creased
 from creeping.geometry.directions import unit_directions
 from creeping.geometry.kept import kept
+from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.quadrature import node_count
 from creeping.geometry.surface import Surface
 from creeping.kernels.threads import thread_count
@@ -245,7 +245,7 @@ def _kind(boundary: BoundaryLike) -> Boundary:
 def _is_rough(body: Surface) -> bool:
     """Whether a body says of itself that it is somewhere not smooth enough for rays: what it is there is not known."""
     rough = getattr(body, "non_smooth", None)
-    if rough is None or is_creased(body):
+    if rough is None or is_piecewise(body):
         return False
     return kept(body, "rough somewhere", lambda: bool(np.any(rough(points_of_charts(body)))))
 

@@ -38,8 +38,8 @@ from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.own_times import trace_own
 from creeping.geodesics.pieces import trace_pieces
 from creeping.geodesics.states import M11, M21, WITH_JACOBI, P, X, pack
-from creeping.geometry.creased import is_creased, pieces_of
 from creeping.geometry.curvature import normal_curvature
+from creeping.geometry.piecewise import is_piecewise, pieces_of
 from creeping.geometry.quadrature import BodyNodes, nodes_at
 from creeping.geometry.surface import normal, project, size
 from creeping.rays.fan import RayFan
@@ -92,7 +92,7 @@ def fan_profiles(
     x0, p0 = fan.points[:, 0], fan.directions[:, 0]
     least = 1 / size(body)
     kappa = normal_curvature(body, x0, p0)
-    jointed = is_creased(body)
+    jointed = is_piecewise(body)
     # beyond a joint rays may be straighter than their neighbours
     typical = np.max if jointed else np.median
     back = float(typical(BEHIND / np.maximum(kappa, least))) if behind is None else behind

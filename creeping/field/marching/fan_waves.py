@@ -32,7 +32,7 @@ from creeping.field.marching.layer import MarchedRays, march_rays
 from creeping.field.marching.plan import MarchStatus
 from creeping.field.ray_sums import RaySum
 from creeping.field.strip_waves import StripTable, around, modes_on_strip
-from creeping.geometry.creased import has_edges, is_creased
+from creeping.geometry.piecewise import has_edges, is_piecewise
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan
 from creeping.rays.quantities import RayPoints
@@ -190,7 +190,7 @@ def spread_out(y: ComplexArray, rays: RayPoints, wavenumber: float) -> ComplexAr
 
 def march_alone(body: Surface, boundary: Boundary) -> bool:
     """Whether marching alone knows the waves: of an admittance that varies, and across joints."""
-    return boundary.varies or (is_creased(body) and not has_edges(body))
+    return boundary.varies or (is_piecewise(body) and not has_edges(body))
 
 
 def marchable(fan: RayFan, boundary: Boundary, order: int, fewest: int = FEWEST_RAYS) -> bool:

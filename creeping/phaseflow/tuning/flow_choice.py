@@ -21,7 +21,7 @@ from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.integrator import ErrorEstimate, trace_states
 from creeping.geodesics.states import pack
 from creeping.geometry.arguments import checked_body, folder_path, number_between, positive_number, reporter
-from creeping.geometry.creased import is_creased
+from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface, size
 from creeping.phaseflow.building import Progress, require_checked, sampled_errors, upper_bound
 from creeping.phaseflow.cache import cached_phase_map, is_cached
@@ -94,7 +94,7 @@ def choose_flow(
     >>> type(flow).__name__, flow.error.rms < 1e-6             # few rays do not pay for a map
     ('DirectFlow', True)
     """
-    checked_body(body, charts=not is_creased(body))
+    checked_body(body, charts=not is_piecewise(body))
     tolerance = number_between(tolerance, "tolerance", 1e-12, 1e-1)
     length = positive_number(length, "length")
     cache = cache if isinstance(cache, bool) else folder_path(cache, "cache")
@@ -107,7 +107,7 @@ def choose_flow(
         carry_jacobi=carry_jacobi,
     )
     report = reporter(progress)
-    if is_creased(body):
+    if is_piecewise(body):
         report("direct integration: a body with creases has no phase map")
         # errors of the steps add up and grow along the rays
         return DirectFlow(body, float(np.clip(1e-4 * tolerance, 1e-13, 1e-8)), length / n_steps)

@@ -11,7 +11,7 @@ from creeping.geometry.arguments import (
     folder_path,
     reporter,
 )
-from creeping.geometry.creased import checked_smooth
+from creeping.geometry.piecewise import checked_smooth
 from creeping.geometry.surface import Surface
 from creeping.phaseflow.building import (
     Plan,

@@ -20,7 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from creeping._typing import FloatArray
-from creeping.geometry.creased import is_creased
+from creeping.geometry.piecewise import is_piecewise
 from creeping.rays.transport import Flow
 from creeping.sweeping.between.fields import FieldsBetween
 from creeping.sweeping.lattice import Lattice
@@ -87,6 +87,6 @@ def sweeper_of(flow: Flow, request: SweepRequest) -> Sweeper | FieldsBetween | S
     """What gives the results of unit directions (n, 3); bodies with creases have no rays that all go on."""
     if isinstance(flow, NoFlow):
         return SolvedSweeper(flow, request)
-    if request.lattice is None or is_creased(flow.body):
+    if request.lattice is None or is_piecewise(flow.body):
         return Sweeper(flow, request)
     return FieldsBetween(flow, request)

@@ -8,7 +8,7 @@ from tolerances import ORDER
 
 import creeping as cr
 import scatterers as sc
-from creeping.geometry.surface import CreasedSurface, project
+from creeping.geometry.surface import PiecewiseSurface, project
 from scatterers.exact.profile import Arc, Line, upward
 
 ALPHA = np.radians(25.0)
@@ -83,7 +83,7 @@ def area_and_volume(corners):
 @every
 def test_is_a_body_of_pieces(name):
     body = BODIES[name]
-    assert isinstance(body, CreasedSurface)
+    assert isinstance(body, PiecewiseSurface)
     assert [crease.kind for crease in body.creases] == KINDS[name]
     for crease in body.creases:
         for number in crease.pieces:
@@ -231,7 +231,7 @@ def test_a_splined_spheroid_converges_to_the_exact_one(rng):
     for n in counts:
         t = np.linspace(-np.pi / 2, np.pi / 2, n)
         body = sc.Revolution(np.stack([2 * np.sin(t), np.cos(t)], axis=-1))
-        assert body.creases == [] and isinstance(body, CreasedSurface)
+        assert body.creases == [] and isinstance(body, PiecewiseSurface)
         errors.append([np.max(np.abs(v)) for v in (body.level(points), shape_operator(body, points) - wanted)])
     slopes = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
     # position as h^6, curvature as h^4, or better

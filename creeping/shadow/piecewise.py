@@ -13,7 +13,7 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import SingularIncidenceError
-from creeping.geometry.creased import SMOOTH, pieces_of, tiles_of
+from creeping.geometry.piecewise import SMOOTH, pieces_of, tiles_of
 from creeping.geometry.surface import size
 from creeping.shadow.attachment import Arc, LaunchPoints, occluded
 from creeping.shadow.curve import ShadowCurve
@@ -42,7 +42,7 @@ EXACT = 1e-12
 Found = tuple[tuple[ShadowCurve, ...], tuple[EdgePart, ...], float, tuple[int, ...]]
 
 
-def creased_curves(body: Any, direction: FloatArray, n_points: int) -> Found:
+def piecewise_curves(body: Any, direction: FloatArray, n_points: int) -> Found:
     """Curves of the line of a unit direction, the longest first.
 
     Returns

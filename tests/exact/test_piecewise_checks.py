@@ -5,14 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shared_bodies as sc
-from creased_bodies import TwoBalls, cut_sphere
 from fake_fields import echo_of
+from piecewise_bodies import TwoBalls, cut_sphere
 
 import creeping as cr
 from creeping.commands import echo_report
 from creeping.commands.run_report import readable, summary_of
 from creeping.geometry.checks import wrong_signs
-from creeping.geometry.creased import is_creased, nearest_crease, pieces_of
+from creeping.geometry.piecewise import is_piecewise, nearest_crease, pieces_of
 from creeping.geometry.surface import fingerprint
 from creeping.rays.specular import smooth_parts
 from scatterers import Cylinder
@@ -25,7 +25,7 @@ CUT = BODIES["cut"]
 def test_good_bodies_pass_their_check(name):
     report = cr.check_surface(BODIES[name])
     assert report.ok, report
-    assert is_creased(BODIES[name]) and len(fingerprint(BODIES[name])) > 20
+    assert is_piecewise(BODIES[name]) and len(fingerprint(BODIES[name])) > 20
 
 
 def test_a_wrong_piece_is_found():

@@ -8,7 +8,7 @@ from tolerances import ORDER
 
 import creeping as cr
 import scatterers as sc
-from creeping.geometry.surface import CreasedSurface
+from creeping.geometry.surface import PiecewiseSurface
 from scatterers.expression.parsing import differentiate
 from scatterers.expression.switches import Switches
 from scatterers.kernels.compiled import Compiled
@@ -62,7 +62,7 @@ def body_of(name):
 @every
 def test_pieces_and_creases(name):
     body = body_of(name)
-    assert isinstance(body, CreasedSurface) and isinstance(body, sc.Implicit)
+    assert isinstance(body, PiecewiseSurface) and isinstance(body, sc.Implicit)
     number, wanted = PIECES[name]
     assert len(body.pieces) == number
     kinds = [crease.kind for crease in body.creases]
@@ -195,7 +195,7 @@ def test_only_joints_leave_charts():
 
 def test_pieces_that_join_smoothly_are_one_smooth_body():
     body = sc.Implicit("x**2 + y**2 + z**2 - 1 + where(z < 0, 0, z**4)")
-    assert type(body) is sc.Implicit and not isinstance(body, CreasedSurface)
+    assert type(body) is sc.Implicit and not isinstance(body, PiecewiseSurface)
 
 
 def test_strict_takes_joints():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import shared_bodies as sc
-from creased_bodies import SplitBall, TwoBalls, cut_sphere
+from piecewise_bodies import SplitBall, TwoBalls, cut_sphere
 from scipy.special import j1
 
 import creeping as cr

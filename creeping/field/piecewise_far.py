@@ -4,7 +4,7 @@
 
 with w of the forward lobe as in `creeping.field.far_rays`. A smooth part is what hangs together by joints; u is 1, but
 w where the part has specular points and all stand clear of its creases (`creeping.rays.specular`). f_optics
-(`creeping.field.creased_far`) holds facets, specular points next to edges, and the forward lobe. The error adds in
+(`creeping.field.piecewise_far`) holds facets, specular points next to edges, and the forward lobe. The error adds in
 squares, besides what is beyond the second order of each ray and specular point,
 
     edges      C/(2π) |∫ e^{ik(d - r).x} dl|        lit or part of the outline, and their parts, C of order 1
@@ -54,9 +54,9 @@ from creeping.field.likely_cells import parted
 from creeping.field.ray_sums import strong_coupling
 from creeping.field.reflected import plane_reflection
 from creeping.field.shed_wave import smoothstep
-from creeping.geometry.creased import Tiles, is_convex, pieces_of, tiles_of
 from creeping.geometry.curvature import curvature_norms
 from creeping.geometry.kept import kept
+from creeping.geometry.piecewise import Tiles, is_convex, pieces_of, tiles_of
 from creeping.geometry.surface import size
 from creeping.kernels.threads import in_threads
 from creeping.rays.fan import RayFan
@@ -97,10 +97,10 @@ FLAT = 1e-6
 """Curvature, in inverse sizes, below which a tile is flat."""
 
 
-def creased_far_field(fan: RayFan, r: FloatArray, k: float, boundary: BoundaryLike, order: int) -> FarField:
+def piecewise_far_field(fan: RayFan, r: FloatArray, k: float, boundary: BoundaryLike, order: int) -> FarField:
     """Far field of a fan in unit directions r (m, 3), by rays and physical optics."""
     kinds = scalar_boundaries(boundary)
-    parts = CreasedParts(fan, far_geometry(fan, r), kinds, k, order)
+    parts = PiecewiseParts(fan, far_geometry(fan, r), kinds, k, order)
     for number, kind in enumerate(kinds):
         parts.add(number, kind)
     return FarField(
@@ -117,7 +117,7 @@ def creased_far_field(fan: RayFan, r: FloatArray, k: float, boundary: BoundaryLi
     )
 
 
-class CreasedParts(Parts):
+class PiecewiseParts(Parts):
     """Parts of the field of one incidence, and what each may be off."""
 
     def __init__(

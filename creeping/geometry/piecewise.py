@@ -79,13 +79,13 @@ class Tiles(NamedTuple):
         return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=-1))
 
 
-def is_creased(body: Any) -> bool:
+def is_piecewise(body: Any) -> bool:
     """Whether a body is one of smooth pieces that meet in creases.
 
     Examples
     --------
     >>> import scatterers as sc
-    >>> is_creased(sc.Sphere())
+    >>> is_piecewise(sc.Sphere())
     False
     """
     # what is no body at all is told by others
@@ -101,7 +101,7 @@ def has_edges(body: Any) -> bool:
     >>> has_edges(sc.Capsule(1.0, 4.0)), has_edges(sc.Cylinder(1.0, 4.0))
     (False, True)
     """
-    return is_creased(body) and any(crease.kind == "edge" for crease in body.creases)
+    return is_piecewise(body) and any(crease.kind == "edge" for crease in body.creases)
 
 
 def checked_smooth(body: Any, what: str, remedy: str) -> None:
@@ -111,7 +111,7 @@ def checked_smooth(body: Any, what: str, remedy: str) -> None:
     ------
     InvalidInputError
     """
-    if is_creased(body):
+    if is_piecewise(body):
         raise InvalidInputError(
             f"{what} needs a smooth body; this one has {len(body.creases)} creases between its pieces: {remedy}"
         )
@@ -152,7 +152,7 @@ def drawn_mesh(body: Any, cells: int) -> tuple[Triangulation, FloatArray]:
     """A body as it is drawn, with the normals of its vertices (n, 3), 1; along edges these are there once a side."""
     if why_no_rays(body):
         return _drawn_parts(body, cells)
-    if is_creased(body):
+    if is_piecewise(body):
         tiles = tiles_of(body, 2.0 / cells)
         corners = tiles.corners.reshape(-1, 3)
         return Triangulation(corners, np.arange(len(corners)).reshape(-1, 3)), tiles.normals.reshape(-1, 3)

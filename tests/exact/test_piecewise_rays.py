@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shared_bodies as sc
 from body_checks import unit
-from creased_bodies import TwoBalls, cut_sphere
+from piecewise_bodies import TwoBalls, cut_sphere
 
 import creeping as cr
 from creeping.errors import InvalidInputError
