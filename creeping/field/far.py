@@ -43,7 +43,7 @@ from creeping.field.validity_range import validity
 from creeping.geometry.arguments import one_of
 from creeping.geometry.checks import unit_of
 from creeping.geometry.directions import fibonacci_directions
-from creeping.geometry.kept import kept
+from creeping.geometry.memo import memo
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
@@ -209,7 +209,7 @@ def measured_level(fan: RayFan, wavenumber: float, boundary: BoundaryLike) -> Le
     for _ in range(3):
         highest *= np.sqrt(NODES / max(expected_nodes(fan, highest), 1))
     k0 = min(wavenumber, float(highest))
-    return kept(fan, f"level {boundary} {k0!r}", lambda: _measured(fan, k0, boundary))
+    return memo(fan, f"level {boundary} {k0!r}", lambda: _measured(fan, k0, boundary))
 
 
 def _measured(fan: RayFan, k0: float, boundary: BoundaryLike) -> Level | None:

@@ -32,7 +32,7 @@ from creeping.geodesics.states import END, WITH_END, WITH_JACOBI
 from creeping.geometry.curvature import ParabolicPoints, parabolic_points
 from creeping.geometry.directions import first_of_equals
 from creeping.geometry.evaluators import evaluators
-from creeping.geometry.kept import kept
+from creeping.geometry.memo import memo
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface, normal, size
 from creeping.geometry.triangulation import Triangulation
@@ -442,7 +442,7 @@ def fold_error(
     if not len(found.points) or not len(rows):
         return out
     wanted, c = difference[rows] / length[rows, None], 0.5 * length[rows]
-    tree = kept(body, "normals of parabolic points", lambda: cKDTree(found.normals))
+    tree = memo(body, "normals of parabolic points", lambda: cKDTree(found.normals))
     near = tree.query(wanted, k=min(NEIGHBOURS, len(found.points)))[1].reshape(len(rows), -1)
     amplitude = _amplitude(found, near, wanted, c[:, None], wavenumber, size(body))
     # the wave must come to the ground, and leave it

@@ -55,7 +55,7 @@ from creeping.field.ray_sums import strong_coupling
 from creeping.field.reflected import plane_reflection
 from creeping.field.shed_wave import smoothstep
 from creeping.geometry.curvature import curvature_norms
-from creeping.geometry.kept import kept
+from creeping.geometry.memo import memo
 from creeping.geometry.piecewise import Tiles, is_convex, pieces_of, tiles_of
 from creeping.geometry.surface import size
 from creeping.kernels.threads import in_threads
@@ -149,7 +149,7 @@ class PiecewiseParts(Parts):
         self.specular = []
         side = side_of_tiles(body, wavenumber)
         # frequencies share them
-        tiles = kept(fan, f"lit tiles {side:g}", lambda: lit_tiles(body, fan.line.direction, side))
+        tiles = memo(fan, f"lit tiles {side:g}", lambda: lit_tiles(body, fan.line.direction, side))
         for part in smooth_parts(body):
             clear, points = _clear_points(body, part, fan.line.direction, r, wavenumber)
             share = np.where(clear, self.in_forward, 1.0)

@@ -21,7 +21,7 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.geometry.curvature import curvature_norms, principal_curvature_bound, second_form
 from creeping.geometry.evaluators import speed_of, speed_values
-from creeping.geometry.kept import kept
+from creeping.geometry.memo import memo
 from creeping.geometry.piecewise import is_piecewise, pieces_of
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.triangulation import triangulate
@@ -36,18 +36,18 @@ def points_of_charts(body: Surface) -> FloatArray:
     Where a body of pieces is not trusted its curvatures are those of a fit that failed: points there are left out.
     """
     if is_piecewise(body):
-        return kept(body, "points of trusted pieces", lambda: _on_pieces(body))
+        return memo(body, "points of trusted pieces", lambda: _on_pieces(body))
     samples: FloatArray | None = getattr(body, "samples", None)
     if samples is not None:
         return samples
     # charts of other bodies may take a minute, and direct integration asks for none
     if not getattr(body, "quick_charts", True):
-        return kept(body, "points without charts", lambda: _on_a_grid(body))
+        return memo(body, "points without charts", lambda: _on_a_grid(body))
     try:
         charts = body.atlas.charts
     except ValueError:
         # too thin or too sharply curved for charts somewhere, which direct integration does not ask for
-        return kept(body, "points without charts", lambda: _on_a_grid(body))
+        return memo(body, "points without charts", lambda: _on_a_grid(body))
     uv = np.stack(np.meshgrid(*[np.linspace(0, 1, 33)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
     return np.concatenate([chart.point(uv) for chart in charts])
 
@@ -70,7 +70,7 @@ def natural_horizon(body: Surface) -> float:
         fastest = float(np.max(speed_values(body, points_of_charts(body)), initial=0.0)) or 1.0
         return float(2.0 ** np.round(np.log2(1 / (sharpest_curvature(body) * fastest))))
 
-    return kept(body, "natural horizon", found)
+    return memo(body, "natural horizon", found)
 
 
 def sharpest_curvature(body: Surface) -> float:
@@ -87,7 +87,7 @@ def sharpest_curvature(body: Surface) -> float:
         # flat pieces alone set no scale of their own
         return max(float(np.quantile(norms, USUAL)) if len(norms) else 0.0, 1 / size(body))
 
-    return kept(body, "sharpest curvature", found)
+    return memo(body, "sharpest curvature", found)
 
 
 def vector_field(body: Surface, points: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:

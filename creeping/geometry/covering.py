@@ -28,7 +28,7 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import SurfaceError
-from creeping.geometry.kept import kept
+from creeping.geometry.memo import memo
 from creeping.geometry.patches import DEGREE, ENDS, Patches, lobatto, on_squares
 from creeping.geometry.piecewise import is_piecewise, nearest_crease, pieces_of, tips_of
 from creeping.geometry.quadrature import nearest_points
@@ -194,7 +194,7 @@ def patches_of(body: Surface) -> Patches:
     >>> bool(patches.off.max() < 1e-5), bool(patches.edges.any())
     (True, True)
     """
-    found: Patches | str = kept(body, "patches", lambda: _made(body))
+    found: Patches | str = memo(body, "patches", lambda: _made(body))
     if isinstance(found, str):
         raise SurfaceError(found)
     return found

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import FloatArray
-from creeping.geometry.kept import kept
+from creeping.geometry.memo import memo
 from creeping.geometry.surface import Surface, normal, project, size
 from creeping.geometry.triangulation import Triangulation, triangulate
 
@@ -123,7 +123,7 @@ def parabolic_points(body: Surface, mesh: Triangulation | None = None) -> Parabo
     >>> bool(abs(abs(found.points[:, 2]) - 0.5).max() < 1e-6), bool(abs(found.across - 2.0).max() < 1e-4)
     (True, True)
     """
-    return kept(
+    return memo(
         body, "parabolic points", lambda: _found(body, mesh or triangulate(body.level, body.gradient, body.bounds))
     )
 

@@ -24,7 +24,7 @@ from weakref import ref
 import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
-from creeping.geometry.kept import kept
+from creeping.geometry.memo import memo
 from creeping.geometry.surface import Surface, size
 
 
@@ -71,7 +71,7 @@ def _offered(body: Surface, role: str, make: Callable[[], Any], source: Any) -> 
     compiled = getattr(source, "compiled", None)
     if compiled is not None:
         return compiled
-    return kept(body, role, make)
+    return memo(body, role, make)
 
 
 @contextmanager

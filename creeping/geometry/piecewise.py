@@ -13,7 +13,7 @@ from scipy.spatial import ConvexHull
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import InvalidInputError
-from creeping.geometry.kept import kept
+from creeping.geometry.memo import memo
 from creeping.geometry.parts import is_faceted, why_no_rays
 from creeping.geometry.patches import halved
 from creeping.geometry.surface import jet, normal, project, size
@@ -124,7 +124,7 @@ def tiles_of(body: Any, share: float) -> Tiles:
         corners, normals, pieces = body.tiles(share * size(body))
         return Tiles(np.asarray(corners, float), np.asarray(normals, float), np.asarray(pieces, np.int64))
 
-    return kept(body, f"tiles {share:g}", made)
+    return memo(body, f"tiles {share:g}", made)
 
 
 def is_convex(body: Any) -> bool:
@@ -145,7 +145,7 @@ def is_convex(body: Any) -> bool:
             for k in range(parts)
         )
 
-    return kept(body, "is convex", asked)
+    return memo(body, "is convex", asked)
 
 
 def drawn_mesh(body: Any, cells: int) -> tuple[Triangulation, FloatArray]:
@@ -189,7 +189,7 @@ def pieces_of(body: Any) -> tuple[Any, ...]:
             Piece(surface, body.bounds, centres[tiles.pieces == number]) for number, surface in enumerate(body.pieces)
         )
 
-    return kept(body, "pieces", made)
+    return memo(body, "pieces", made)
 
 
 def pieces_across(body: Any) -> FloatArray:
@@ -202,7 +202,7 @@ def pieces_across(body: Any) -> FloatArray:
             out[number] = np.linalg.norm(np.ptp(tiles.corners[tiles.pieces == number].reshape(-1, 3), axis=0))
         return out
 
-    return kept(body, "pieces across", made)
+    return memo(body, "pieces across", made)
 
 
 def piece_ahead(body: Any, points: FloatArray, directions: FloatArray) -> IntArray:
@@ -217,7 +217,7 @@ def nearest_crease(
 
     Of creases between ``pieces`` (n, 2), in either order, where there are such.
     """
-    segments = kept(body, "crease segments", lambda: _Segments.of(body))
+    segments = memo(body, "crease segments", lambda: _Segments.of(body))
     wanted = np.isin(segments.kinds, [KINDS.index(kind) for kind in kinds])
     best, nearest = np.full(len(points), -1), np.full(len(points), np.inf)
     left = np.ones(len(points), dtype=bool)

@@ -27,7 +27,7 @@ from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import SurfaceError
 from creeping.geometry.curvature import adjugate_form, second_form
 from creeping.geometry.evaluators import entries_of, evaluators
-from creeping.geometry.kept import kept
+from creeping.geometry.memo import memo
 from creeping.geometry.parts import inside
 from creeping.geometry.piecewise import Tiles, is_piecewise, pieces_of
 from creeping.geometry.surface import Surface, size
@@ -142,7 +142,7 @@ def body_nodes(body: Surface, rate: float) -> BodyNodes:
     """
     if is_piecewise(body):
         return _on_pieces(body, rate)
-    found = kept(body, "quadratures", lambda: Rules(body, _nodes))
+    found = memo(body, "quadratures", lambda: Rules(body, _nodes))
     while found.cells:
         cells, points, tiles = found.rule(body, rate)
         if points > MOST or tiles * points**2 > MOST_NODES:
@@ -175,7 +175,7 @@ def node_count(body: Surface, rate: float) -> int:
     """
     if is_piecewise(body):
         return _piece_rules(body).rule(body, rate)[2]
-    found = kept(body, "quadratures", lambda: Rules(body, _nodes))
+    found = memo(body, "quadratures", lambda: Rules(body, _nodes))
     if not found.cells:
         return MOST_NODES + 1
     _, points, tiles = found.rule(body, rate)
@@ -212,7 +212,7 @@ def _onto(body: Surface, points: FloatArray, areas: FloatArray) -> BodyNodes:
 
 
 def _piece_rules(body: Any) -> PieceRules:
-    found: PieceRules = kept(body, "piece quadratures", lambda: PieceRules(body, _piece_nodes))
+    found: PieceRules = memo(body, "piece quadratures", lambda: PieceRules(body, _piece_nodes))
     return found
 
 
@@ -293,7 +293,7 @@ def inner_points(body: Surface, depth: float, count: int) -> FloatArray:
     >>> points.shape, bool(np.linalg.norm(points, axis=1).max() < 0.7)
     ((50, 3), True)
     """
-    x, distance = kept(body, "depths", lambda: _depths(body))
+    x, distance = memo(body, "depths", lambda: _depths(body))
     return np.asarray(x[distance > depth][:count])
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import SurfaceError
-from creeping.geometry.kept import kept
+from creeping.geometry.memo import memo
 from creeping.geometry.surface import Surface, size
 
 ROUNDING = 1e-11
@@ -61,7 +61,7 @@ def charted_axis(body: Surface) -> FloatArray | None:
         axis = axis_of_revolution(body)
         return (axis if axis is not None and _off(body, axis) <= ROUNDING else None,)
 
-    return kept(body, "axis of revolution", found)[0]
+    return memo(body, "axis of revolution", found)[0]
 
 
 def rotations(axis: FloatArray, angles: ArrayLike) -> FloatArray:

@@ -31,7 +31,7 @@ from creeping.geometry.arguments import flag, one_of, real_number, whole_number
 from creeping.geometry.checks import unit_of
 from creeping.geometry.curvature import gaussian_curvature, normal_curvature
 from creeping.geometry.evaluators import speed_of, speed_values
-from creeping.geometry.kept import kept
+from creeping.geometry.memo import memo
 from creeping.geometry.piecewise import has_edges, is_piecewise
 from creeping.geometry.surface import Surface, fingerprint, size
 from creeping.rays.ends import Losses, Starts, ends_of, outline_share
@@ -291,7 +291,7 @@ def enough_steps(body: Surface, length: float) -> int:
         fastest = float(np.max(speed_values(body, points)))
         return float(np.sqrt(np.max(np.abs(gaussian_curvature(body, points))))) * fastest
 
-    curved = kept(body, "fastest oscillation of J", found)
+    curved = memo(body, "fastest oscillation of J", found)
     return int(max(64, np.ceil(4 * length * curved / np.pi)))
 
 

@@ -26,7 +26,7 @@ from creeping.geodesics.states import ATTENUATION, DETACHMENT, END, WHOLE, pack,
 from creeping.geometry.arguments import positive_number, shown
 from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.evaluators import speed_of, speed_values
-from creeping.geometry.kept import kept
+from creeping.geometry.memo import memo
 from creeping.geometry.surface import Surface, size
 from creeping.rays.quantities import RayPoints
 from creeping.rays.transport import carried
@@ -98,7 +98,7 @@ def ray_length(
         return asked_length(body, _positive("length", length, ", nor 'auto'"))
     if speed_of(body) is not None:
         return weighted_length(body)
-    launch = kept(line, "trial launch points", lambda: line.launch_points(TRIALS))
+    launch = memo(line, "trial launch points", lambda: line.launch_points(TRIALS))
     return float(decayed_lengths(body, launch, wavenumber, decay)[0])
 
 
@@ -147,7 +147,7 @@ def early_length(body: Surface, wavenumber: float) -> float:
 
 def trial_points(body: Surface) -> LaunchPoints:
     """Launch points of INCIDENCES evenly spread incidences, found once."""
-    return kept(body, "trial points", lambda: shadow_lines(body, fibonacci_directions(INCIDENCES), TRIALS).launch)
+    return memo(body, "trial points", lambda: shadow_lines(body, fibonacci_directions(INCIDENCES), TRIALS).launch)
 
 
 def decayed_lengths(
@@ -169,7 +169,7 @@ def decayed_lengths(
         return curvature, carried(DirectFlow(body, rtol=RTOL), launch, times, components=whole_lanes(body))
 
     # the same for all wavenumbers
-    curvature, states = kept(launch, "trial rays", traced)
+    curvature, states = memo(launch, "trial rays", traced)
     k = None if wavenumber is None else _positive("wavenumber", wavenumber)
     found = np.full(len(there), most)
     for row in np.flatnonzero(there.any(axis=1)):

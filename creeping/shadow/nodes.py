@@ -14,7 +14,7 @@ import numpy as np
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.incident import rows_of
-from creeping.geometry.kept import kept
+from creeping.geometry.memo import memo
 from creeping.geometry.surface import Surface, normal, project, size
 from creeping.kernels.threads import in_slices
 from creeping.shadow.meshes import LineMeshes
@@ -85,7 +85,7 @@ class Finished:
 
 def prepared(body: Surface) -> LineMeshes:
     """Meshes of a body, made once."""
-    return kept(body, "line meshes", lambda: LineMeshes(body))
+    return memo(body, "line meshes", lambda: LineMeshes(body))
 
 
 def box_of(body: Surface) -> FloatArray:

@@ -18,7 +18,7 @@ from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.field.currents.nodes import LitNodes
 from creeping.geodesics.equations import points_of_charts
 from creeping.geometry.curvature import curvature_norms, gaussian_curvature
-from creeping.geometry.kept import kept
+from creeping.geometry.memo import memo
 from creeping.geometry.surface import Surface
 from creeping.kernels.threads import in_threads
 
@@ -56,7 +56,7 @@ def may_face_itself(body: Surface) -> bool:
         gauss = gaussian_curvature(body, points)
         return _has_saddles(gauss, curvature_norms(body, points) ** 2 + 2 * gauss)
 
-    return kept(body, "may face itself", found)
+    return memo(body, "may face itself", found)
 
 
 def received(

@@ -21,7 +21,7 @@ from creeping.errors import SurfaceError
 from creeping.field.boundary import Boundary
 from creeping.field.equation.tiles import POINTS, SIDE, VARYING, Tiles, tiles_for, tiles_of
 from creeping.geometry.covering import patches_of
-from creeping.geometry.kept import kept
+from creeping.geometry.memo import memo
 from creeping.geometry.parts import inside, is_faceted, why_no_rays
 from creeping.geometry.patches import SHARP, Patches, chordal, facet_patches, halved, own_triangles, sides_of, turns_of
 from creeping.geometry.piecewise import is_piecewise
@@ -45,7 +45,7 @@ def body_tiles(body: Any, wavenumber: float, boundary: Boundary, *, finest: bool
         return facet_tiles(body, wavenumber, boundary, finest=finest)
     if why_no_rays(body):
         return _joined(body, [body_tiles(part, wavenumber, boundary, finest=True) for part in body.parts])
-    facets = kept(body, "own triangles", lambda: own_triangles(body)) if is_piecewise(body) else None
+    facets = memo(body, "own triangles", lambda: own_triangles(body)) if is_piecewise(body) else None
     if facets is not None and facets.flat:
         return facet_tiles(facets, wavenumber, boundary, finest=finest)
     try:
@@ -159,7 +159,7 @@ def facet_tiles(body: Faceted, wavenumber: float, boundary: Boundary, *, finest:
 
 def _patches(body: Faceted) -> Patches:
     """Squares of a body, made once."""
-    return kept(body, "facet patches", lambda: facet_patches(body))
+    return memo(body, "facet patches", lambda: facet_patches(body))
 
 
 def _chosen(body: Faceted, wavelength: float) -> Rule:

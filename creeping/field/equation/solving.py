@@ -31,7 +31,7 @@ from creeping.field.equation.matrix import EACH, VECTOR
 from creeping.field.equation.solution import Solution
 from creeping.geodesics.equations import points_of_charts
 from creeping.geometry.directions import unit_directions
-from creeping.geometry.kept import kept
+from creeping.geometry.memo import memo
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.quadrature import node_count
 from creeping.geometry.surface import Surface
@@ -247,11 +247,11 @@ def _is_rough(body: Surface) -> bool:
     rough = getattr(body, "non_smooth", None)
     if rough is None or is_piecewise(body):
         return False
-    return kept(body, "rough somewhere", lambda: bool(np.any(rough(points_of_charts(body)))))
+    return memo(body, "rough somewhere", lambda: bool(np.any(rough(points_of_charts(body)))))
 
 
 def _nodes(body: Surface, wavenumber: float, kind: Boundary) -> int:
-    known: dict[tuple[float, bool, bool], int] = kept(body, "nodes of tiles", dict)
+    known: dict[tuple[float, bool, bool], int] = memo(body, "nodes of tiles", dict)
     key = wavenumber, kind.varies, kind.kind == "conductor"
     if key not in known:
         known[key] = len(body_tiles(body, wavenumber, kind).points)
@@ -259,7 +259,7 @@ def _nodes(body: Surface, wavenumber: float, kind: Boundary) -> int:
 
 
 def _found(body: Surface, direction: FloatArray, wavenumber: float, boundary: BoundaryLike) -> Solved | None:
-    known: list[Solution] = kept(body, "solutions", list)
+    known: list[Solution] = memo(body, "solutions", list)
     for solution in known:
         if solution.wavenumber == wavenumber and solution.boundary == boundary:
             same = np.flatnonzero(np.max(np.abs(solution.directions - direction), axis=1) < SAME)
@@ -269,6 +269,6 @@ def _found(body: Surface, direction: FloatArray, wavenumber: float, boundary: Bo
 
 
 def _keep(body: Surface, solution: Solution) -> None:
-    known: list[Solution] = kept(body, "solutions", list)
+    known: list[Solution] = memo(body, "solutions", list)
     known.append(solution)
     del known[:-KEPT]

@@ -13,7 +13,7 @@ T = TypeVar("T")
 _KEPT: dict[int, dict[str, Any]] = {}
 
 
-def kept(owner: object, name: str, make: Callable[[], T]) -> T:
+def memo(owner: object, name: str, make: Callable[[], T]) -> T:
     """What ``make`` gives at the first call for an owner and a name."""
     if id(owner) not in _KEPT:
         try:
