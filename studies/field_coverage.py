@@ -25,7 +25,7 @@ import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.errors import SingularIncidenceError
-from creeping.field.body_currents import kept_currents
+from creeping.field.body_currents import cached_currents
 from creeping.rays.fan import RayFan
 from studies.reference import clouds, dipoles, fundamental, sphere
 
@@ -176,7 +176,7 @@ def _columns(
     bad = off > OFF * largest
     return np.array(
         [
-            100 * kept_currents(fan, k, kind).extinction,
+            100 * cached_currents(fan, k, kind).extinction,
             100 * _rms(off[:500]) / _rms(exact[:500]),
             100 * np.mean(covered[:500]),
             100 * np.mean(covered[500:]),

@@ -12,7 +12,7 @@ from creeping import files, plotting
 from creeping._typing import ArrayLike, FloatArray
 from creeping.commands.body import asked_wavenumber, frequency_words, write_tables
 from creeping.errors import CreepingError, InvalidInputError
-from creeping.field.body_currents import kept_currents
+from creeping.field.body_currents import cached_currents
 from creeping.field.boundary import BoundaryLike, parse_boundary
 from creeping.field.comparison import cross_section_decibels
 from creeping.field.equation.solution import Solution
@@ -216,7 +216,7 @@ class Job:
             names.append("far.png" if number == 1 else f"far_{number}.png")
             plotting.far_cut_picture(output / names[-1], theta, group, parts=len(group) == 1, angle_name="θ", **words)
         if far.error_by == "extinction":
-            currents = kept_currents(of, self.wavenumber, self.boundary) if isinstance(of, RayFan) else of.currents()
+            currents = cached_currents(of, self.wavenumber, self.boundary) if isinstance(of, RayFan) else of.currents()
             plotting.currents_picture(
                 output / "field.png", currents, wave=self.told(far.unit), backend=backend, dpi=DPI
             )

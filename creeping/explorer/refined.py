@@ -12,7 +12,7 @@ from creeping._typing import ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.explorer.preview import Preview
 from creeping.explorer.request import ViewRequest
-from creeping.field.body_currents import affordable, has_expansions, kept_currents
+from creeping.field.body_currents import affordable, cached_currents, has_expansions
 from creeping.field.far import far_field
 from creeping.field.far_result import FarField
 from creeping.geometry.directions import directions_from_angles
@@ -107,7 +107,7 @@ def _on_body(
         if not alone and not affordable(fan, 2 * round(360 / CUT_STEP), k, distant=True):
             return None, None
         try:
-            currents = kept_currents(fan, k, request.kind)
+            currents = cached_currents(fan, k, request.kind)
         except InvalidInputError:
             return None, None
         if request.boundary == "pec":

@@ -15,7 +15,7 @@ from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, scalar_boundaries
-from creeping.field.currents.bounce import faces_itself, may_face_itself
+from creeping.field.currents.bounce import may_self_reflect, self_reflects
 from creeping.field.currents.conductor import ConductorCurrents, conductor_waves
 from creeping.field.currents.nodes import RAYS, STEPS, LitNodes, lit_nodes, lit_waves, ray_nodes, ray_waves
 from creeping.field.currents.radiation import grid_cells, transformed
@@ -111,7 +111,7 @@ def surface_currents(
         )
     lit = lit_nodes(fan.body, fan.line, k)
     try:
-        currents, facing = _expanded(fan, lit, k, kinds), faces_itself(lit)
+        currents, facing = _expanded(fan, lit, k, kinds), self_reflects(lit)
     except SurfaceError:
         # along the axis of a capsule rays start on a joint
         found = solution_for(*problem) if solve is None else None
@@ -123,7 +123,7 @@ def surface_currents(
     if found:
         return _of_line(fan, found)
     if facing and currents.boundary.kind in ("soft", "hard", "conductor"):
-        currents.values[currents.lit] += currents.thrown(lit.points, lit.normals)
+        currents.values[currents.lit] += currents.reflected_onto(lit.points, lit.normals)
     return currents
 
 
@@ -202,7 +202,7 @@ def expected_seconds(fan: RayFan, wavenumbers: FloatArray, directions: int, boun
     known = [float(k) for k in wavenumbers if affordable(fan, directions, float(k), distant=True)]
     plain = SECONDS * sum(expected_nodes(fan, k) * (MAKING + directions) for k in known)
     solved = _unserved(fan) > CUT or not has_expansions(fan.body, boundary)
-    if not (solved or may_face_itself(fan.body)):
+    if not (solved or may_self_reflect(fan.body)):
         return plain
     return plain + sum(expected_seconds_of(fan.body, k, boundary) for k in known)
 
@@ -216,20 +216,20 @@ def expected_nodes(fan: RayFan, wavenumber: float) -> int:
 
 
 def solved_currents(fan: RayFan, wavenumber: float, boundary: BoundaryLike) -> SurfaceCurrents | None:
-    """Currents of the body's integral equation, where `kept_currents` gives these by itself; None elsewhere.
+    """Currents of the body's integral equation, where `cached_currents` gives these by itself; None elsewhere.
 
     So fields far, near and on the body go one way. Nothing is made where the equation would cost too much.
     """
     if is_large(fan.body, wavenumber, boundary) or not affordable(fan, POINTS_INSIDE, wavenumber):
         return None
     try:
-        found = kept_currents(fan, wavenumber, boundary)
+        found = cached_currents(fan, wavenumber, boundary)
     except (InvalidInputError, SurfaceError):
         return None
     return found if isinstance(found, (TileCurrents, ConductorTileCurrents)) else None
 
 
-def kept_currents(
+def cached_currents(
     fan: RayFan, wavenumber: float, boundary: BoundaryLike, *, solve: bool | None = None
 ) -> SurfaceCurrents:
     """Currents of the whole body, made once for each of the last wavenumbers and boundaries.

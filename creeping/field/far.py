@@ -30,7 +30,7 @@ import numpy as np
 from creeping._typing import ArrayLike
 from creeping.errors import SurfaceError
 from creeping.field.arguments import checked, checked_method, checked_plain, observers_of
-from creeping.field.body_currents import affordable, expected_nodes, has_expansions, kept_currents, surface_currents
+from creeping.field.body_currents import affordable, cached_currents, expected_nodes, has_expansions, surface_currents
 from creeping.field.boundary import BoundaryLike, scalar_boundaries
 from creeping.field.currents.far_sum import far_by_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
@@ -134,7 +134,7 @@ def far_field(
         currents = solved.currents if solved else None
     if not currents and (must or cheap):
         try:
-            currents = kept_currents(fan, k, boundary, solve=solve)
+            currents = cached_currents(fan, k, boundary, solve=solve)
         except SurfaceError:
             if must:
                 raise

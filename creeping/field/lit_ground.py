@@ -22,9 +22,9 @@ import numpy as np
 from creeping._typing import ComplexArray, FloatArray
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale
-from creeping.field.currents.bounce import may_face_itself
+from creeping.field.currents.bounce import may_self_reflect
 from creeping.field.currents.nodes import LitNodes
-from creeping.field.point_result import FieldStatus, Served, Words
+from creeping.field.point_result import FieldStatus, PointValues, Words
 from creeping.field.ray_sums import RaySum
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import size
@@ -64,7 +64,7 @@ def convex(fan: RayFan) -> bool:
     """
     if fan.line.fractions["attached"] < 1.0 or not np.all(fan.status == RayStatus.OK):
         return False
-    return is_piecewise(fan.body) or not may_face_itself(fan.body)
+    return is_piecewise(fan.body) or not may_self_reflect(fan.body)
 
 
 def composed(
@@ -76,7 +76,7 @@ def composed(
     k: float,
     kind: Boundary,
     unit: float,
-) -> Served:
+) -> PointValues:
     """Total field at points of the body (n,), of one or three components.
 
     ``lit`` are the lit side's part of it, its error and its share; ``rays`` came ``by`` some method; ``left`` is what
@@ -104,7 +104,7 @@ def composed(
     creeping = np.where(out.reshape(-1, *(1,) * (creeping.ndim - 1)), 0.0, creeping)
     error = np.where(out, np.where(bare, 0.0, np.fmin(error, most)), error)
     status = np.where(share == 1, FieldStatus.OK, status)
-    return Served(
+    return PointValues(
         wave=wave,
         creeping=creeping,
         error=np.hypot(error, lit_off),
@@ -114,7 +114,7 @@ def composed(
     )
 
 
-def without_tips(field: Served) -> Served:
+def without_tips(field: PointValues) -> PointValues:
     """The field without values where curvature is infinite, as on a tip: 0, without a bound, UNRESOLVED."""
     values = field.values.reshape(len(field.error), -1)
     bad = ~(np.all(np.isfinite(values) & (np.abs(values) < NO_VALUE), axis=1) & np.isfinite(field.error))

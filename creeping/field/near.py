@@ -32,7 +32,7 @@ import numpy as np
 from creeping._typing import ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import checked, checked_method, checked_plain
-from creeping.field.body_currents import affordable, kept_currents, solved_currents
+from creeping.field.body_currents import affordable, cached_currents, solved_currents
 from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
 from creeping.field.currents.whole_body import SurfaceCurrents, far_enough, total_at
 from creeping.field.equation.currents import TileCurrents
@@ -40,7 +40,7 @@ from creeping.field.far_geometry import fan_strips
 from creeping.field.marching.fan_waves import march_alone
 from creeping.field.near_wave import height_above, shed_waves
 from creeping.field.on_body import rays_on, total_on
-from creeping.field.point_result import FieldStatus, NearField, Served, judged, measured_field, zero_field
+from creeping.field.point_result import FieldStatus, NearField, PointValues, judged, measured_field, zero_field
 from creeping.field.ray_sums import RaySum, own_error, ray_sum
 from creeping.field.surface import scalar_boundary
 from creeping.field.validity_range import validity
@@ -142,7 +142,7 @@ def near_field(
     must = method in ("currents", "equation") or has_edges(fan.body)
     solved: SurfaceCurrents | None = None
     if must:
-        solved = kept_currents(fan, k, boundary, solve=True if method == "equation" else None)
+        solved = cached_currents(fan, k, boundary, solve=True if method == "equation" else None)
     elif method == "auto" and order == 2:
         solved = solved_currents(fan, k, boundary)
     by_currents = method != "rays" and order == 2 and (must or affordable(fan, len(off), k))
@@ -164,7 +164,9 @@ def near_field(
     return _result(field, fan, y, k, boundary, order)
 
 
-def _result(field: Served, fan: RayFan, points: FloatArray, k: float, boundary: BoundaryLike, order: int) -> NearField:
+def _result(
+    field: PointValues, fan: RayFan, points: FloatArray, k: float, boundary: BoundaryLike, order: int
+) -> NearField:
     """The field at points (..., 3), judged, in the parts that a reader wants."""
     shape = points.shape[:-1]
     phase = np.exp(1j * k * (points @ fan.line.direction))
@@ -204,7 +206,7 @@ def checked_height(fan: RayFan, points: FloatArray) -> FloatArray:
     return np.asarray(height)
 
 
-def _rays_off(fan: RayFan, points: FloatArray, lit: BoolArray, k: float, kind: Boundary, order: int) -> Served:
+def _rays_off(fan: RayFan, points: FloatArray, lit: BoolArray, k: float, kind: Boundary, order: int) -> PointValues:
     """Creeping rays at points off the body (n, 3)."""
     shed = shed_near(fan_strips(fan), fan.body, points)
     shed = shed[free_ways(fan.body, shed.rays, shed.reach)]
@@ -214,11 +216,11 @@ def _rays_off(fan: RayFan, points: FloatArray, lit: BoolArray, k: float, kind: B
     return rays_alone(ray_sum(fan, shed, len(points), waves, error, k, kind), lit)
 
 
-def _no_rays(lit: BoolArray) -> Served:
+def _no_rays(lit: BoolArray) -> PointValues:
     """The field where no rays were asked (n,)."""
     nothing = np.zeros(len(lit), dtype=complex)
     status = np.where(lit, FieldStatus.LIT, FieldStatus.NO_RAY)
-    return Served(
+    return PointValues(
         wave=nothing,
         creeping=nothing,
         error=np.where(lit, MISSING, 1.0),
@@ -228,7 +230,7 @@ def _no_rays(lit: BoolArray) -> Served:
     )
 
 
-def _rays_alone_on(fan: RayFan, points: FloatArray, k: float, kind: Boundary, order: int) -> Served:
+def _rays_alone_on(fan: RayFan, points: FloatArray, k: float, kind: Boundary, order: int) -> PointValues:
     """Creeping rays alone at points on the body (n, 3)."""
     d = fan.line.direction
     lit = normal(fan.body, points) @ d < 0
@@ -237,13 +239,13 @@ def _rays_alone_on(fan: RayFan, points: FloatArray, k: float, kind: Boundary, or
     return replace(rays_alone(rays, lit), method=by)
 
 
-def rays_alone(rays: RaySum, lit: BoolArray) -> Served:
+def rays_alone(rays: RaySum, lit: BoolArray) -> PointValues:
     """A sum over rays as the field, with a bound of what it lacks on the lit side and where it is not to be trusted."""
     status = np.where(lit, FieldStatus.LIT, rays.status).astype(np.int64)
     bad = status != FieldStatus.OK
     # a sum that is not to be trusted has the whole of its waves for a bound already
     missing = np.where(lit, MISSING, np.where(rays.error > 0, 0.0, 1.0))
-    return Served(
+    return PointValues(
         wave=np.zeros_like(rays.values),
         creeping=rays.values,
         error=rays.error + np.where(bad, missing, 0.0),
@@ -254,7 +256,7 @@ def rays_alone(rays: RaySum, lit: BoolArray) -> Served:
 
 
 def _with_currents(
-    field: Served,
+    field: PointValues,
     fan: RayFan,
     points: FloatArray,
     asked: IntArray,
@@ -264,14 +266,14 @@ def _with_currents(
     *,
     must: bool,
     solved: SurfaceCurrents | None,
-) -> Served:
+) -> PointValues:
     """The field with that of currents, or of the layer, at the points asked for where it must be or is better."""
     if not must and not affordable(fan, len(asked), k):
         return field
     try:
-        currents = solved or kept_currents(fan, k, boundary)
+        currents = solved or cached_currents(fan, k, boundary)
         if isinstance(currents, TileCurrents):
-            return field.put_better(asked, _solved_at(currents, points[asked], dark[asked]), must=must)
+            return field.replaced_where_better(asked, _solved_at(currents, points[asked], dark[asked]), must=must)
         far = far_enough(fan.body, k, points[asked])
     except SurfaceError:
         if must:
@@ -279,20 +281,24 @@ def _with_currents(
         return field
     at, close = asked[far], asked[~far]
     incident, scattered, error = total_at(currents, points[at], dark[at])
-    field = field.put_better(at, measured_field(incident + scattered, error, "currents", "extinction"), must=must)
+    field = field.replaced_where_better(
+        at, measured_field(incident + scattered, error, "currents", "extinction"), must=must
+    )
     if len(close):
         rows, layer = layer_field(fan, currents, points[close], scalar_boundary(boundary))
-        field = field.put_better(close[rows], layer, must=must)
+        field = field.replaced_where_better(close[rows], layer, must=must)
     return field
 
 
-def _solved_at(currents: TileCurrents, points: FloatArray, dark: BoolArray) -> Served:
+def _solved_at(currents: TileCurrents, points: FloatArray, dark: BoolArray) -> PointValues:
     """Total field of solved currents at points (n, 3), L, off the body, some of them in the dark."""
     incident, scattered, _ = total_at(currents, points, dark)
     return measured_field(incident + scattered, currents.error_around(points), "equation", "extinction")
 
 
-def layer_field(fan: RayFan, currents: SurfaceCurrents, points: FloatArray, kind: Boundary) -> tuple[IntArray, Served]:
+def layer_field(
+    fan: RayFan, currents: SurfaceCurrents, points: FloatArray, kind: Boundary
+) -> tuple[IntArray, PointValues]:
     """Rows of the points (n, 3), L, less than half a wavelength off the body, that the layer serves, and its field."""
     body, k, d = fan.body, currents.wavenumber, currents.direction
     at, nodes, height, tops = feet_of(body, points, k, ABOVE)

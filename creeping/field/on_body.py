@@ -37,7 +37,7 @@ from creeping._typing import ArrayLike, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import PLAIN, checked, checked_method, checked_plain, fock_parameter, scales
 from creeping.field.beams import length_scale
-from creeping.field.body_currents import affordable, kept_currents, solved_currents
+from creeping.field.body_currents import affordable, cached_currents, solved_currents
 from creeping.field.boundary import Boundary, BoundaryLike, ImpedanceBoundary, boundary_name
 from creeping.field.creeping_modes import fock_scale
 from creeping.field.currents.nodes import TAKEN_OVER, lit_part, lit_waves
@@ -47,7 +47,7 @@ from creeping.field.equation.currents import TileCurrents
 from creeping.field.far_geometry import fan_strips
 from creeping.field.lit_ground import composed, convex, lit_error, without_tips
 from creeping.field.marching.fan_waves import fan_waves, march_alone, marchable, marched_sum, marches, spread_out
-from creeping.field.point_result import FieldStatus, Served, SurfaceField, Words, judged, measured_field
+from creeping.field.point_result import FieldStatus, PointValues, SurfaceField, Words, judged, measured_field
 from creeping.field.ray_sums import NARROW_ALONE, RaySum, own_error, ray_sum, tube_share
 from creeping.field.special.fock import surface_function
 from creeping.field.surface import scalar_boundary, surface_waves
@@ -138,7 +138,7 @@ def surface_field(
     y = as_points(points)
     shape = y.shape[:-1]
     on = on_body(fan.body, y).reshape(-1, 3)
-    solved = kept_currents(fan, k, boundary, solve=True) if method == "equation" else None
+    solved = cached_currents(fan, k, boundary, solve=True) if method == "equation" else None
     total = total_on(fan, on, k, kind, order, solved)
     status = judged(total.status, total.values, total.error, total.error_by, k if kind.kind == "soft" else 1.0)
     return SurfaceField(
@@ -202,7 +202,7 @@ def total_on(
     kind: Boundary,
     order: int,
     currents: SurfaceCurrents | None = None,
-) -> Served:
+) -> PointValues:
     """Total field at points of the body (n, 3).
 
     ``currents`` are those of the wavenumber and boundary, if they are at hand.
@@ -220,14 +220,14 @@ def total_on(
     rays, by = rays_on(fan, points, k, kind, order, 1 - lit[2])
     left = currents.extinction if currents else 0.0 if alone else np.nan
     if currents and order == 2 and kind.kind in ("soft", "hard") and not jointed:
-        thrown = currents.thrown(points, normal(fan.body, points))
+        thrown = currents.reflected_onto(points, normal(fan.body, points))
         # as much may come later, to and fro, and to the dark side, whose rays do not know of it
         lit = lit[0] + lit[2] * thrown, np.hypot(lit[1], np.abs(thrown)), lit[2]
     field = composed(fan, lit, rays, by, left, k, kind, unit)
     return without_tips(field) if jointed else field
 
 
-def _solved_on(currents: TileCurrents, points: FloatArray) -> Served:
+def _solved_on(currents: TileCurrents, points: FloatArray) -> PointValues:
     """Total field of solved currents at points of the body (n, 3)."""
     found = currents.on_body(points)
     field = measured_field(found.values, found.error, "equation", "extinction")
@@ -238,7 +238,7 @@ def _currents_of(fan: RayFan, k: float, kind: Boundary) -> SurfaceCurrents | Non
     """Currents of the whole body; None if they cost too much or there is no mesh for them."""
     try:
         # as many points as they are judged at
-        return kept_currents(fan, k, _boundary_of(kind)) if affordable(fan, INNER, k) else None
+        return cached_currents(fan, k, _boundary_of(kind)) if affordable(fan, INNER, k) else None
     except (InvalidInputError, SurfaceError):
         return None
 

@@ -264,7 +264,7 @@ class SurfaceField(PointField):
 
 
 @dataclass(frozen=True, eq=False)
-class Served:
+class PointValues:
     """Field at points (n,), and by what it came.
 
     Attributes
@@ -291,11 +291,11 @@ class Served:
         """Sum of the parts (n,)."""
         return np.asarray(self.wave + self.creeping)
 
-    def __getitem__(self, at: IntArray | BoolArray) -> Served:
+    def __getitem__(self, at: IntArray | BoolArray) -> PointValues:
         """Some of the points."""
-        return Served(*(getattr(self, one.name)[at] for one in fields(self)))
+        return PointValues(*(getattr(self, one.name)[at] for one in fields(self)))
 
-    def put(self, at: IntArray, other: Served) -> Served:
+    def put(self, at: IntArray, other: PointValues) -> PointValues:
         """Another field in place of this one at the points ``at``."""
         arrays = []
         for one in fields(self):
@@ -304,9 +304,9 @@ class Served:
             taken = mine.astype(np.result_type(mine, its))
             taken[at] = its
             arrays.append(taken)
-        return Served(*arrays)
+        return PointValues(*arrays)
 
-    def put_better(self, at: IntArray, other: Served, *, must: bool) -> Served:
+    def replaced_where_better(self, at: IntArray, other: PointValues, *, must: bool) -> PointValues:
         """Another one where it must be, or is OK and this one is not, errs more, or may have missed a wave.
 
         What rays have missed is not in their error: they must agree with currents within what both state.
@@ -320,18 +320,18 @@ class Served:
         return self.put(at[better], other[better])
 
 
-def zero_field(count: int, method: str) -> Served:
+def zero_field(count: int, method: str) -> PointValues:
     """The field 0, exactly: u on a soft body."""
     nothing = np.zeros(count, dtype=complex)
     status = np.full(count, int(FieldStatus.OK), dtype=np.int64)
-    return Served(nothing, nothing, np.zeros(count), np.full(count, "expansion"), status, np.full(count, method))
+    return PointValues(nothing, nothing, np.zeros(count), np.full(count, "expansion"), status, np.full(count, method))
 
 
-def measured_field(values: ComplexArray, error: FloatArray, method: str, error_by: str) -> Served:
+def measured_field(values: ComplexArray, error: FloatArray, method: str, error_by: str) -> PointValues:
     """Field of currents (n,); where its error is not known nothing is but the size of the wave."""
     known = np.isfinite(error)
     status = np.where(known, FieldStatus.OK, FieldStatus.UNRESOLVED).astype(np.int64)
-    return Served(
+    return PointValues(
         wave=values,
         creeping=np.zeros_like(values),
         error=np.where(known, error, 1.0),

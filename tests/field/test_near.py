@@ -76,7 +76,7 @@ def test_currents_are_not_made_where_rays_are_fine(fan, monkeypatch):
     def refused(*_):
         raise AssertionError("currents were made")
 
-    monkeypatch.setattr(near, "kept_currents", refused)
+    monkeypatch.setattr(near, "cached_currents", refused)
     y = np.array([[0.6, 0.0, 1.0], [0.0, 0.7, 0.85]])
     assert np.all(cr.near_field(fan, y, wavenumber=40.0, boundary="soft").method == "rays")
     with pytest.raises(AssertionError, match="currents were made"):

@@ -143,10 +143,10 @@ def test_a_body_too_thin_to_look_inside_has_bounds(monkeypatch, torus):
     class Unknown:
         body, extinction, solved = torus.body, float("nan"), False
 
-        def thrown(self, points, normals):
+        def reflected_onto(self, points, normals):
             return np.zeros(len(points))
 
-    monkeypatch.setattr(module, "kept_currents", lambda *_: Unknown())
+    monkeypatch.setattr(module, "cached_currents", lambda *_: Unknown())
     x = [(1 + 0.5 * np.cos(2.5), 0.0, -0.5 * np.sin(2.5))]
     u = cr.surface_field(torus, x, wavenumber=30.0, boundary="soft")
     assert u.status_counts == {"UNRESOLVED": 1} and u.error_by[0] == "bound" and u.error[0] >= 2 * 30.0

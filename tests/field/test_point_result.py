@@ -162,13 +162,13 @@ def test_what_serves_gives_way_to_what_is_ok_and_errs_less():
     values = np.array([0.25, 1.0, 1.0, 1.0], dtype=complex)
     other = measured_field(values, np.array([0.2, 0.2, 0.5, np.nan]), "currents", "extinction+x")
     at = np.arange(4)
-    found = mine.put_better(at, other, must=False)
+    found = mine.replaced_where_better(at, other, must=False)
     assert found.method.tolist() == ["rays", "currents", "currents", "rays"]
     assert found.error_by.tolist() == ["expansion", "extinction+x", "extinction+x", "expansion"]
     assert found.status.tolist() == [0, 0, 0, 4] and found.values.tolist() == [0, 1, 1, 0]
     # what the two differ by, more than both state, the one with the smaller error has overlooked
-    apart = mine.put_better(at[:1], replace(other, wave=np.ones(4, dtype=complex))[at[:1]], must=False)
+    apart = mine.replaced_where_better(at[:1], replace(other, wave=np.ones(4, dtype=complex))[at[:1]], must=False)
     assert apart.method[0] == "currents" and apart.error[0] == 0.2
-    must = mine.put_better(at[2:], other[2:], must=True)
+    must = mine.replaced_where_better(at[2:], other[2:], must=True)
     assert must.method.tolist() == ["rays", "rays", "currents", "currents"]
     assert must.status[3] == FieldStatus.UNRESOLVED and must.error[3] == 1.0

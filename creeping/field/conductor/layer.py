@@ -28,7 +28,7 @@ from creeping.field.conductor.on_body import OnConductor, on_conductor
 from creeping.field.currents.conductor import ConductorCurrents
 from creeping.field.currents.whole_body import level_at
 from creeping.field.near import GRAZING, feet_of, layer_terms, solved
-from creeping.field.point_result import FieldStatus, Served, measured_field
+from creeping.field.point_result import FieldStatus, PointValues, measured_field
 from creeping.geometry.quadrature import SYMMETRIC, BodyNodes, body_nodes
 from creeping.rays.fan import RayFan
 from creeping.shadow.attachment import occluded
@@ -63,7 +63,7 @@ def lowest_height(currents: ConductorCurrents) -> float:
 
 def layer_fields(
     fan: RayFan, currents: ConductorCurrents, points: FloatArray, left: FloatArray
-) -> tuple[IntArray, list[Served]]:
+) -> tuple[IntArray, list[PointValues]]:
     """Rows of the points (n, 3), L, that the layer serves, and E and H (m, 6) there for each polarisation."""
     body, k, d = fan.body, currents.wavenumber, currents.direction
     low = lowest_height(currents)
@@ -85,7 +85,7 @@ def layer_fields(
         one = measured_field(field, error, "layer", "extinction+expansion")
         # without the field on the body there is none above it
         status = np.where(surface.current[i].status == FieldStatus.OK, one.status, surface.current[i].status)
-        found.append(Served(one.wave, one.creeping, one.error, one.error_by, status.astype(np.int64), one.method))
+        found.append(PointValues(one.wave, one.creeping, one.error, one.error_by, status.astype(np.int64), one.method))
     return at, found
 
 

@@ -29,7 +29,7 @@ import numpy as np
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import SurfaceError
 from creeping.field.arguments import PLAIN, checked, checked_method, checked_plain, scales
-from creeping.field.body_currents import affordable, kept_currents, solved_currents
+from creeping.field.body_currents import affordable, cached_currents, solved_currents
 from creeping.field.boundary import CONDUCTOR, ELECTRIC_HARD, ELECTRIC_SOFT
 from creeping.field.conductor.layer import incident_fields, layer_fields, lowest_height, total_fields
 from creeping.field.conductor.on_body import OnConductor, on_conductor
@@ -43,7 +43,7 @@ from creeping.field.far_result import incident_mix, spherical_frame
 from creeping.field.lit_ground import LEFT, UNKNOWN, convex
 from creeping.field.near import MISSING, ON_BODY, checked_height, rays_alone
 from creeping.field.near_wave import height_above, shed_waves
-from creeping.field.point_result import FieldStatus, Served, judged, measured_field, zero_field
+from creeping.field.point_result import FieldStatus, PointValues, judged, measured_field, zero_field
 from creeping.field.ray_sums import RaySum, own_error, ray_sum
 from creeping.field.validity_range import validity
 from creeping.geodesics.bundle import as_points, on_body
@@ -260,26 +260,26 @@ def _for(fan: RayFan, k: float, mix: ComplexArray, count: int) -> ConductorCurre
 
 def _currents(fan: RayFan, k: float, mix: ComplexArray, *, solve: bool | None = None) -> ConductorCurrents:
     """Currents of the whole body for these polarisations."""
-    found = kept_currents(fan, k, "pec", solve=solve)
+    found = cached_currents(fan, k, "pec", solve=solve)
     assert isinstance(found, ConductorCurrents)
     return found.polarised(mix)
 
 
-def _no_field(count: int) -> Served:
+def _no_field(count: int) -> PointValues:
     """No E and no H (n, 6)."""
     none = zero_field(count, "rays")
     nothing = np.zeros((count, 6), dtype=complex)
-    return Served(nothing, nothing, none.error, none.error_by, none.status, none.method)
+    return PointValues(nothing, nothing, none.error, none.error_by, none.status, none.method)
 
 
-def _unknown(count: int) -> Served:
+def _unknown(count: int) -> PointValues:
     """E and H (n, 6) of which a bound alone is known."""
     nothing, words = np.zeros((count, 6), dtype=complex), np.full(count, "none")
     status = np.full(count, int(FieldStatus.UNRESOLVED), dtype=np.int64)
-    return Served(nothing, nothing, np.full(count, MISSING), np.full(count, "bound"), status, words)
+    return PointValues(nothing, nothing, np.full(count, MISSING), np.full(count, "bound"), status, words)
 
 
-def _on_body(found: OnConductor, i: int, n: FloatArray) -> Served:
+def _on_body(found: OnConductor, i: int, n: FloatArray) -> PointValues:
     """E and H (n, 6) of a polarisation on the body."""
     J = found.current[i]
     share = np.linalg.norm(J.wave, axis=1), np.linalg.norm(J.creeping, axis=1)
@@ -293,10 +293,10 @@ def _on_body(found: OnConductor, i: int, n: FloatArray) -> Served:
         )
     # E there is the charge's
     error = np.maximum(J.error, found.charge_error[:, i])
-    return Served(wave, creeping, error, J.error_by, J.status, J.method)
+    return PointValues(wave, creeping, error, J.error_by, J.status, J.method)
 
 
-def _from_elsewhere(rays: Served, left: float) -> Served:
+def _from_elsewhere(rays: PointValues, left: float) -> PointValues:
     """Rays with the error by waves that come from elsewhere on the body, of which ``left`` inside of it tells."""
     known = np.isfinite(left)
     return replace(
@@ -307,7 +307,7 @@ def _from_elsewhere(rays: Served, left: float) -> Served:
 
 
 def _with_currents(
-    fields: list[Served],
+    fields: list[PointValues],
     fan: RayFan,
     points: FloatArray,
     asked: IntArray,
@@ -316,13 +316,13 @@ def _with_currents(
     currents: ConductorCurrents | None,
     *,
     must: bool = False,
-) -> list[Served]:
+) -> list[PointValues]:
     """Fields with those of currents, or of the layer, at the points asked for where they must be or are better."""
     if currents is None:
         return fields
     if isinstance(currents, ConductorTileCurrents):
         solution = _solved_at(currents, points[asked], dark[asked])
-        return [one.put_better(asked, its, must=must) for one, its in zip(fields, solution, strict=True)]
+        return [one.replaced_where_better(asked, its, must=must) for one, its in zip(fields, solution, strict=True)]
     k = currents.wavenumber
     far = far_enough(fan.body, k, points[asked], lowest_height(currents))
     at, close = asked[far], asked[~far]
@@ -330,14 +330,16 @@ def _with_currents(
         incident, scattered, error = total_fields(currents, points[at], dark[at])
         total = incident + scattered
         new = [measured_field(total[..., i], error[:, i], "currents", "extinction") for i in range(len(fields))]
-        fields = [one.put_better(at, its, must=must) for one, its in zip(fields, new, strict=True)]
+        fields = [one.replaced_where_better(at, its, must=must) for one, its in zip(fields, new, strict=True)]
     if len(close):
         rows, layer = layer_fields(fan, currents, points[close], left)
-        fields = [one.put_better(close[rows], its, must=must) for one, its in zip(fields, layer, strict=True)]
+        fields = [
+            one.replaced_where_better(close[rows], its, must=must) for one, its in zip(fields, layer, strict=True)
+        ]
     return fields
 
 
-def _solved_at(currents: ConductorTileCurrents, points: FloatArray, dark: BoolArray) -> list[Served]:
+def _solved_at(currents: ConductorTileCurrents, points: FloatArray, dark: BoolArray) -> list[PointValues]:
     """E and H (n, 6) of each polarisation by solved currents at points (n, 3), L, off the body."""
     incident, scattered, _ = total_fields(currents, points, dark)
     total, error = incident + scattered, currents.error_around(points)
@@ -345,7 +347,7 @@ def _solved_at(currents: ConductorTileCurrents, points: FloatArray, dark: BoolAr
 
 
 def _result(
-    fields: list[Served], fan: RayFan, points: FloatArray, k: float, electric: ComplexArray, *, single: bool
+    fields: list[PointValues], fan: RayFan, points: FloatArray, k: float, electric: ComplexArray, *, single: bool
 ) -> ConductorField:
     """The field at points (..., 3), judged, in the parts that a reader wants."""
     shape = points.shape[:-1]
@@ -378,7 +380,9 @@ def _result(
     )
 
 
-def _judgement(fields: list[Served], sizes: list[FloatArray], shape: tuple[int, ...], single: bool) -> dict[str, Any]:
+def _judgement(
+    fields: list[PointValues], sizes: list[FloatArray], shape: tuple[int, ...], single: bool
+) -> dict[str, Any]:
     """Error, its source, status and method (..., p) of values so large."""
     status = [judged(v.status, s, v.error, v.error_by, 1.0) for v, s in zip(fields, sizes, strict=True)]
     arrays = {name: [getattr(v, name) for v in fields] for name in ("error", "error_by", "method")} | {"status": status}

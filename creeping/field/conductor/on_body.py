@@ -38,7 +38,7 @@ from creeping.field.currents.nodes import TAKEN_OVER, axes_of_incidence, lit_par
 from creeping.field.equation.currents import ON_BODY, ConductorTileCurrents
 from creeping.field.far_geometry import fan_strips
 from creeping.field.lit_ground import composed, convex, lit_error
-from creeping.field.point_result import LEAST_WORTH, WORTH, FieldStatus, Served, Words, measured_field
+from creeping.field.point_result import LEAST_WORTH, WORTH, FieldStatus, PointValues, Words, measured_field
 from creeping.field.ray_sums import RaySum, own_error, ray_sum, total_of
 from creeping.field.strip_waves import StripTable, modes_on_strip, resampled, without_tubes
 from creeping.field.surface import surface_waves
@@ -107,7 +107,7 @@ class OnConductor:
 
     Attributes
     ----------
-    current : list of Served
+    current : list of PointValues
         J (n, 3) of each polarisation.
     charge : (n, p) complex
         n.E, in units of the incident E.
@@ -116,7 +116,7 @@ class OnConductor:
         (1/k) dH_n/dn of expansions, whose error is that of J.
     """
 
-    current: list[Served]
+    current: list[PointValues]
     charge: ComplexArray
     charge_error: FloatArray
     slope: ComplexArray | None = None
@@ -162,14 +162,14 @@ def _by_expansions(
     electric: ComplexArray,
     left: FloatArray,
     currents: ConductorCurrents | None,
-) -> tuple[list[Served], ComplexArray]:
+) -> tuple[list[PointValues], ComplexArray]:
     """J of expansions at points (n,) for each polarisation, and at them and around them (5n, 3, p)."""
     around, normals = cross.points, cross.normals
     count = len(around) // 5
     lit, lit_off, share = _lit_at(fan, around, normals, k, electric)
     if currents is not None and not convex(fan):
         at = np.flatnonzero(share > 0)
-        thrown = share[at, None, None] * currents.thrown(around[at], normals[at])
+        thrown = share[at, None, None] * currents.reflected_onto(around[at], normals[at])
         lit[at] += thrown
         lit_off[at] = np.hypot(lit_off[at], BEYOND * np.linalg.norm(thrown, axis=1))
     rays, by = _rays_at(fan, around, normals, k, electric, 1 - share)

@@ -36,7 +36,7 @@ SADDLE = -1e-3
 """K, over the square of the largest curvature, below which a body is not convex."""
 
 
-def faces_itself(part: LitNodes) -> bool:
+def self_reflects(part: LitNodes) -> bool:
     """Whether the lit side is somewhere not convex, so that it may face other parts of the body."""
     total = part.along + part.across
     gauss = part.along * part.across - part.twist**2
@@ -48,8 +48,8 @@ def _has_saddles(gauss: FloatArray, square: FloatArray) -> bool:
     return bool(np.min(gauss, initial=0.0) < SADDLE * np.max(square, initial=0.0))
 
 
-def may_face_itself(body: Surface) -> bool:
-    """`faces_itself` of all ground, by points all over a body."""
+def may_self_reflect(body: Surface) -> bool:
+    """`self_reflects` of all ground, by points all over a body."""
 
     def found() -> bool:
         points = points_of_charts(body)

@@ -64,7 +64,7 @@ class ConductorCurrents(SurfaceCurrents):
         """E0 of each polarisation (3, p)."""
         return np.asarray(spherical_frame(self.direction).T @ self.mix)
 
-    def thrown(self, points: FloatArray, normals: FloatArray) -> ComplexArray:
+    def reflected_onto(self, points: FloatArray, normals: FloatArray) -> ComplexArray:
         """J that points of the body (m, 3), L, with normals, receive from above: (m, 3, p)."""
         strength = self.values * (self.weights / (4 * np.pi))[:, None, None]
         return received_vectors((points, normals), (self.points, self.normals), strength, self.wavenumber)

@@ -184,7 +184,7 @@ class SurfaceCurrents:
             )
         return x
 
-    def thrown(self, points: FloatArray, normals: FloatArray) -> ComplexArray:
+    def reflected_onto(self, points: FloatArray, normals: FloatArray) -> ComplexArray:
         """What points of a soft or hard body (m, 3), L, with normals, receive from above: u, or du/dn if soft (m,)."""
         u, slope = self._scalar(self.values)
         nothing = np.zeros(len(self.points), dtype=complex)

@@ -7,7 +7,7 @@ from body_checks import directions
 
 import creeping as cr
 from creeping.errors import InvalidInputError
-from creeping.field.body_currents import kept_currents
+from creeping.field.body_currents import cached_currents
 from creeping.field.conductor import near
 from creeping.shadow.attachment import occluded
 
@@ -80,7 +80,7 @@ def test_onto_the_body_the_field_is_that_on_it(ball, rng):
 
 def test_currents_radiate_by_maxwells_equations(ball, rng):
     """The sums for E and for H are two kernels: curl E = ikH and curl H = -ikE between them."""
-    currents = kept_currents(ball, 8.0, "pec")
+    currents = cached_currents(ball, 8.0, "pec")
     x = 1.5 * directions(rng, 6)
     step = 1e-3
     ends = np.concatenate([x + sign * step * axis for axis in np.eye(3) for sign in (1, -1)])

@@ -82,7 +82,7 @@ def test_peanut_against_fundamental_solutions(boundary, monkeypatch):
     exact = solution.far_field(r)[:, 0]
     fan = cr.launch(cr.DirectFlow(body, rtol=1e-7), cr.shadow_line(body, direction=d), length=3.0, n_rays=32)
     currents = cr.surface_currents(fan, wavenumber=14.0, boundary=boundary, solve=False)
-    monkeypatch.setattr("creeping.field.body_currents.faces_itself", lambda part: False)
+    monkeypatch.setattr("creeping.field.body_currents.self_reflects", lambda part: False)
     without = cr.surface_currents(fan, wavenumber=14.0, boundary=boundary, solve=False)
     off, before = (np.sqrt(np.mean(np.abs(one.far(r) - exact) ** 2)) for one in (currents, without))
     assert off < 0.75 * before
@@ -98,7 +98,7 @@ def test_conducting_torus_against_dipoles(monkeypatch):
     exact = dipoles.scatter(cloud, 8.0, d[None], depth=depth, per_wavelength=8.0).far_field(r)[:, 0]
     fan = cr.launch(cr.DirectFlow(body, rtol=1e-7), cr.shadow_line(body, direction=d), length=3.0, n_rays=32)
     currents = cr.surface_currents(fan, wavenumber=8.0, boundary="pec", solve=False)
-    monkeypatch.setattr("creeping.field.body_currents.faces_itself", lambda part: False)
+    monkeypatch.setattr("creeping.field.body_currents.self_reflects", lambda part: False)
     without = cr.surface_currents(fan, wavenumber=8.0, boundary="pec", solve=False)
     off, before = (np.sqrt(np.mean(np.abs(one.far(r) - exact) ** 2)) for one in (currents, without))
     assert off < 0.95 * before

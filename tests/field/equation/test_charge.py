@@ -7,7 +7,7 @@ from body_checks import directions
 
 import creeping as cr
 from creeping.errors import InvalidInputError
-from creeping.field.body_currents import kept_currents
+from creeping.field.body_currents import cached_currents
 from creeping.field.equation.currents import ON_BODY
 from creeping.field.equation.solving import asked_solution
 from creeping.field.far_result import incident_mix
@@ -71,14 +71,14 @@ def test_next_to_faces_and_edges(flat):
 
 
 def test_no_charge_is_made(flat):
-    currents = kept_currents(flat, 4.0, "pec")
+    currents = cached_currents(flat, 4.0, "pec")
     area = currents.weights.sum()
     assert np.all(np.abs(currents.weights @ currents.charge) < 1e-3 * area)
 
 
 @pytest.mark.slow
 def test_units_scale(flat):
-    currents = kept_currents(flat, 4.0, "pec")
+    currents = cached_currents(flat, 4.0, "pec")
     small = cr.solve(sc.Cylinder(0.5e-3, 1e-3), D, wavenumber=4e3, boundary="pec").currents()
     x = np.array([[0.1, 0.0, 0.501], [0.6, 0.0, 0.3]])
     np.testing.assert_allclose(small.scattered_electric(1e-3 * x), currents.scattered_electric(x), atol=1e-4)
