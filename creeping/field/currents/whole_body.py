@@ -62,9 +62,9 @@ RIM = 0.3
 """Share of the error, in the square, that stands next to the shadow line."""
 AHEAD = 1.0
 """What of epsilon the field itself is off by, where it is large."""
-QUADRATURE = 1e-5
-"""What sums over the nodes of expansions err by, of f straight ahead, where |f| is k f_rms^2 at least. On spheres of
-ka = 100 and more that is up to 3e-5 of the largest |f|, however little is left inside."""
+QUADRATURE = 4e-4
+"""What sums over the nodes of expansions err by at least, of f_rms, however little is left inside: spheres of
+ka = 100 to 250, soft and hard."""
 BESIDE, STEP, LARGEST = 6, 0.05, 2.0
 """Nodes next to one, the change of admittance to these from which it steps, and |u| of a wave that comes back."""
 POINTS = 100
@@ -243,7 +243,7 @@ class SurfaceCurrents:
         along = self._together(r).reshape(-1, *(1,) * (change.ndim - 1))
         own = AHEAD * np.abs(self.far(r))
         error = self._left * np.hypot(np.hypot(level * share * along, own), shape * change)
-        return np.asarray(np.hypot(error, 0.0 if self.solved else QUADRATURE * self.wavenumber * self._amplitude**2))
+        return np.asarray(np.hypot(error, 0.0 if self.solved else QUADRATURE * self._amplitude))
 
     def changed(self, points: ArrayLike) -> FloatArray:
         """What the second order adds at points (m, 3), L, off the body, over what it adds inside, rms: (m,)."""
