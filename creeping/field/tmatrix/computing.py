@@ -21,18 +21,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from creeping._typing import ArrayLike, ComplexArray, FloatArray
+from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, boundary_name, scalar_boundaries
 from creeping.field.equation.body_tiles import body_tiles
-from creeping.field.equation.columns import solved_columns
 from creeping.field.equation.currents import inside_points
-from creeping.field.equation.matrix import EACH, VECTOR, Matrix, Places
+from creeping.field.equation.matrix import EACH, VECTOR, Matrix
 from creeping.field.equation.solving import PER_NODE, PRODUCTS, SUM, SUM_VECTOR
-from creeping.field.equation.tiles import Tiles
+from creeping.field.tmatrix.mirrors import mirrors_of, no_mirrors
 from creeping.field.tmatrix.result import TMatrix
-from creeping.field.tmatrix.spherical_waves import combined, count, gradients, regular, vector_count, vector_parts
+from creeping.field.tmatrix.solved_waves import SolvedWaves
+from creeping.field.tmatrix.spherical_waves import count, vector_count
 from creeping.geometry.arguments import real_array, whole_number
 from creeping.geometry.checks import unit_of
 from creeping.geometry.surface import Surface
@@ -42,17 +42,14 @@ from creeping.storage.memory import budget, within_budget
 SECONDS = 300.0
 """What it may take, unless the caller says."""
 DIGITS = 2.0
-"""Decimal digits of f that degrees keep, about, as a share of the largest (`studies`-less: measured in tests)."""
+"""Digits that waves of the degrees kept give: of a flat-ended cylinder, k = 5, 10 and 20, f lacks 8e-5, 2e-5 and 3e-5
+of the largest at 1600 pairs of directions for want of higher ones."""
 LEAST = 3
 """Degrees at least."""
-RATE = 2e10
-"""Single-precision operations that LAPACK does in a second on a core, about."""
+RATE, PER_SUM = 3e10, 4e-9
+"""Single-precision operations that LAPACK does in a second on a core, and seconds of a sum over images, about."""
 DENSE = 0.7
 """Share of the memory that the factors and the waves at the nodes may take."""
-COLUMNS = 512
-"""Right sides that are solved together: between them an interrupt is heard."""
-TINY = 1e-18
-"""Share of a wave's rms at the nodes below which it is 0: products of such numbers are slow and nothing."""
 
 
 def t_matrix(
@@ -113,7 +110,9 @@ def t_matrix(
     middle = _center(body, center)
     radius = float(np.max(np.linalg.norm(tiles.points - middle, axis=1)))
     degree = order_for(k * radius) if order is None else whole_number(order, "order")
-    plan = plan_for(len(tiles.points), kind, degree)
+    matrix = Matrix(tiles, k, kind)
+    mirrors = mirrors_of(matrix, middle)
+    plan = plan_for(len(tiles.points), kind, degree, len(mirrors.images))
     what = f"the T-matrix of order {degree} at wavenumber {k:g} by {len(tiles.points)} nodes"
     if plan.seconds > seconds:
         raise InvalidInputError(
@@ -122,18 +121,17 @@ def t_matrix(
         )
     within_budget(plan.memory, what, "lower the wavenumber, or let creeping.solve serve for few incidences")
     tell(f"{what}: about {plan.seconds:.2g} s and {plan.memory / 1e9:.2g} GB")
-    waves = _Waves(Matrix(tiles, k, kind), middle, degree)
-    values = waves.factorised(tell) if plan.direct else waves.iterated(tell)
-    tell("outgoing waves")
-    extinction = waves.extinction(body, tiles, values)
+    planes = mirrors if plan.direct else no_mirrors(matrix)
+    solved = SolvedWaves(matrix, middle, degree, planes, tell, direct=plan.direct)
+    tell("what is left inside")
     return TMatrix(
-        matrix=waves.outgoing(values),
+        matrix=solved.T,
         wavenumber=k,
         center=middle,
         boundary=boundary_name(boundary),
         vector=kind.kind == "conductor",
         body=" ".join(repr(body).split()),
-        extinction=extinction,
+        extinction=solved.extinction(inside_points(body, tiles, 2 * np.pi / k)),
         absorbing=kind.kind == "impedance",
         unit=unit_of(body),
     )
@@ -158,20 +156,22 @@ class Plan(NamedTuple):
     direct: bool
 
 
-def plan_for(nodes: int, kind: Boundary, order: int) -> Plan:
-    """What a T-matrix from so many nodes takes."""
+def plan_for(nodes: int, kind: Boundary, order: int, parts: int = 1) -> Plan:
+    """What a T-matrix from so many nodes takes, of a body of so many parts that are images of each other."""
     c = 2 if kind.kind == "conductor" else 1
     n, waves = float(c * nodes), float(vector_count(order) if c == 2 else count(order))
-    near = 2 * nodes * PER_NODE * c
-    # waves at the nodes in and out, single precision, and what is solved
-    tables = 40 * n * waves + 2e4 * n
-    memory = 8 * n**2 + tables
+    # values of all waves, waves at the nodes of a part, and the matrix itself
+    tables = 8 * n * waves + 80 * n * waves / parts + 64 * waves**2 + 2e4 * n
+    memory = 8 * n**2 / parts + tables
     if memory <= DENSE * budget():
-        pairs = 2 * float(nodes) ** 2 * EACH * (VECTOR if c == 2 else 1.0)
-        operations = 8 / 3 * n**3 + 8 * n**2 * waves + 8 * n * waves**2
-        return Plan((pairs + near + operations / RATE) / thread_count(), memory, True)
+        pairs = 2 * float(nodes) ** 2 * EACH * (VECTOR if c == 2 else 1.0) + 2 * nodes * PER_NODE * c
+        own, each = n / parts, waves / parts
+        solved = 8 / 3 * own**3 + 8 * own**2 * each + 8 * own * each**2
+        added = 2 * n**2 / parts * (2 + np.log2(parts)) * PER_SUM
+        return Plan((pairs / parts + parts * solved / RATE + added) / thread_count(), memory, True)
     each = SUM_VECTOR if c == 2 else SUM
-    return Plan(near / thread_count() + PRODUCTS * waves * each * nodes, tables, False)
+    seconds = 2 * nodes * PER_NODE * c / thread_count() + PRODUCTS * waves * each * nodes
+    return Plan(seconds, 80 * n * waves + 2e4 * n, False)
 
 
 def _center(body: Surface, center: ArrayLike | None) -> FloatArray:
@@ -181,109 +181,3 @@ def _center(body: Surface, center: ArrayLike | None) -> FloatArray:
     if given.shape != (3,):
         raise InvalidInputError(f"center has shape {given.shape}; give three numbers")
     return given
-
-
-class _Waves:
-    """Spherical waves about a centre at the nodes of an equation."""
-
-    def __init__(self, matrix: Matrix, center: FloatArray, order: int) -> None:
-        self._of, self._center, self._order = matrix, center, order
-        k, c = matrix.k, matrix.columns
-        self._nodes = _Tables(matrix.nodes, matrix.nodes.points - center, k, order, vector=c == 2)
-        right = self._right(matrix.nodes, self._nodes)
-        under = self._right(matrix.inner, _Tables(matrix.inner, matrix.inner.points - center, k, order, vector=c == 2))
-        self._size = np.sqrt(np.mean(np.abs(right) ** 2, axis=0))
-        self._size[self._size == 0] = 1.0
-        self._given = right / self._size, under / self._size
-        for part in self._given:
-            part[np.abs(part) < TINY] = 0.0
-
-    def _right(self, places: Places, tables: "_Tables") -> ComplexArray:
-        """Twice the incident wave at places, as the equation has it: (c p, waves)."""
-        if self._of.vector:
-            return 2 * tables.across
-        return 2 * (tables.slope if self._of.soft else tables.values)
-
-    def factorised(self, tell: Callable[[str], None]) -> ComplexArray:
-        """Values at the nodes (c n, waves), over sizes of the waves, by LAPACK."""
-        from scipy.linalg import lu_factor, lu_solve
-
-        matrix, c = self._of, self._of.columns
-        right, under = self._given
-        rows = (c * matrix.at[:, None] + np.arange(c)).ravel()
-        B = np.empty(right.shape, dtype=np.complex64, order="F")
-        B[:] = right
-        B[rows] -= 1j * under
-        root = np.repeat(matrix.root, c).astype(np.float32)[:, None]
-        B *= root
-        # rows of C are columns of Fortran
-        whole = matrix.__dict__.pop("whole", None)
-        whole = matrix.whole if whole is None else whole
-        matrix.__dict__.pop("whole", None)
-        tell("factors of the matrix")
-        factors = lu_factor(whole.T, overwrite_a=True, check_finite=False)
-        del whole
-        for first in range(0, B.shape[1], COLUMNS):
-            tell(f"wave {first} of {B.shape[1]}")
-            at = slice(first, first + COLUMNS)
-            B[:, at] = lu_solve(factors, B[:, at], trans=1, overwrite_b=True, check_finite=False)
-        B /= root
-        return B
-
-    def iterated(self, tell: Callable[[str], None]) -> ComplexArray:
-        """The same by GMRES."""
-        matrix, c = self._of, self._of.columns
-        right, under = (part.reshape(-1, c, part.shape[1]) for part in self._given)
-        found = solved_columns(matrix, right, under, tell)
-        return found.values.reshape(right.shape[0] * c, -1)
-
-    def outgoing(self, values: ComplexArray) -> ComplexArray:
-        """The T-matrix of values (c n, waves)."""
-        matrix, k = self._of, self._of.k
-        w = np.repeat(matrix.root**2, matrix.columns)[:, None]
-        if matrix.vector:
-            out = -(k**2) * w * self._nodes.along.conj()
-        elif matrix.soft:
-            out = -1j * k * w * self._nodes.values.conj()
-        else:
-            out = 1j * k * w * self._nodes.slope.conj()
-            if matrix.boundary.kind == "impedance":
-                eta = np.broadcast_to(matrix.boundary.at(matrix.tiles.points).admittance, len(w))[:, None]
-                out -= k**2 * w * eta * self._nodes.values.conj()
-        size = np.sqrt(np.mean(np.abs(out) ** 2, axis=0))
-        size[size == 0] = 1.0
-        out /= size
-        out[np.abs(out) < TINY] = 0.0
-        found = out.astype(np.complex64).T @ values.astype(np.complex64)
-        return size[:, None] * found.astype(complex) * self._size
-
-    def extinction(self, body: Surface, tiles: Tiles, values: ComplexArray) -> float:
-        """What is left inside of plane waves from everywhere, rms."""
-        matrix, k = self._of, self._of.k
-        x = inside_points(body, tiles, 2 * np.pi / k)
-        if not len(x):
-            return float("nan")
-        if matrix.vector:
-            return float("nan")
-        kind, factor = ("single", -0.5) if matrix.soft else ("double", 0.5)
-        places = Places.at(x, np.broadcast_to([0.0, 0.0, 1.0], x.shape))
-        left = factor * matrix.received(places, values, kind) * self._size + regular(x - self._center, k, self._order)
-        return float(np.sqrt(4 * np.pi * np.sum(np.abs(left) ** 2) / len(x)))
-
-
-class _Tables:
-    """Regular waves at places, about a centre at the origin of ``points`` (p, 3)."""
-
-    def __init__(self, places: Places, points: FloatArray, k: float, order: int, *, vector: bool) -> None:
-        table = regular(points, k, order + 1)
-        if not vector:
-            self.values = table[:, : count(order)]
-            self.slope = k * combined(table, gradients(order), places.normals)
-            return
-        parts = vector_parts(order)
-        both = np.stack([combined(table, parts, t) for t in (places.a, places.b)], axis=1)
-        waves = both.shape[2]
-        self.along = both.reshape(-1, waves)
-        # H of N is -i M, that of M is -i N; a.(n x H) = -b.H, b.(n x H) = a.H
-        H = -1j * both.reshape(len(points), 2, -1, 2)[..., ::-1].reshape(both.shape)
-        self.across = np.stack([-H[:, 1], H[:, 0]], axis=1).reshape(-1, waves)

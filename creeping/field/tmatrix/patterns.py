@@ -2,9 +2,9 @@
 
     f(d, r) = (4 pi/k) sum (-i)^(l+1) V(r) T i^l' conj V'(d),   V = Y_lm, or X_lm and i r cross X_lm
 
-V is a trigonometric polynomial of degree l in theta, carried on beyond the poles, times e^{im phi}. So f(d, -d) is one of
-degree 2L in both angles: its coefficients are sums over waves of one m and one m' at a time, and values at any number
-of directions a nonuniform Fourier transform. Turned by R, waves of a degree change among themselves,
+V is a trigonometric polynomial of degree l in theta, carried on beyond the poles, times e^{im phi}. So f(d, -d) is one
+of degree 2L in both angles: its coefficients are sums over waves of one m and one m' at a time, and values at any
+number of directions a nonuniform Fourier transform. Turned by R, waves of a degree change among themselves,
 
     psi_lm(R^T x) = sum D^l_m'm psi_lm'(x),   D^l = int conj Y_lm'(r) Y_lm(R^T r) dr
 
@@ -16,7 +16,7 @@ Sources: [MTL02, sec. 5.3]; [BMK19].
 
 import numpy as np
 
-from creeping._typing import ComplexArray, FloatArray
+from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.field.tmatrix.spherical_waves import (
     count,
     degrees,
@@ -37,22 +37,22 @@ def far_table(directions: FloatArray, order: int, *, vector: bool) -> ComplexArr
     return far_vectors(directions, order) if vector else harmonics(directions, order)[:, None]
 
 
-def degrees_of(order: int, *, vector: bool) -> tuple[FloatArray, FloatArray]:
+def degrees_of(order: int, *, vector: bool) -> tuple[IntArray, IntArray]:
     """Degrees and orders of the waves (waves,) each."""
-    l, m = vector_degrees(order)[:2] if vector else degrees(order)
-    return l, m
+    deg, m = vector_degrees(order)[:2] if vector else degrees(order)
+    return deg, m
 
 
 def received(directions: FloatArray, order: int, *, vector: bool) -> ComplexArray:
     """Regular waves in plane ones along unit directions (n, 3), by component: (n, c, waves)."""
-    l, _ = degrees_of(order, vector=vector)
-    return np.asarray(4 * np.pi * 1j**l * far_table(directions, order, vector=vector).conj())
+    deg, _ = degrees_of(order, vector=vector)
+    return np.asarray(4 * np.pi * 1j**deg * far_table(directions, order, vector=vector).conj())
 
 
 def sent(directions: FloatArray, order: int, wavenumber: float, *, vector: bool) -> ComplexArray:
     """Far fields of outgoing waves in unit directions (n, 3), L: (n, c, waves)."""
-    l, _ = degrees_of(order, vector=vector)
-    return np.asarray((-1j) ** (l + 1) / wavenumber * far_table(directions, order, vector=vector))
+    deg, _ = degrees_of(order, vector=vector)
+    return np.asarray((-1j) ** (deg + 1) / wavenumber * far_table(directions, order, vector=vector))
 
 
 def gauss_sphere(degree: int) -> tuple[FloatArray, FloatArray]:
@@ -69,10 +69,10 @@ def backward_series(T: ComplexArray, wavenumber: float, theta: FloatArray, order
 
     Components are those of -d, with theta and phi there, and of d.
     """
-    l, m = degrees_of(order, vector=vector)
+    deg, m = degrees_of(order, vector=vector)
     # -d is at pi - theta and phi + pi
-    out = far_profiles(np.pi - theta, order, vector=vector) * ((-1j) ** (l + 1) / wavenumber * (-1.0) ** m)
-    into = far_profiles(theta, order, vector=vector).conj() * (4 * np.pi * 1j**l)
+    out = far_profiles(np.pi - theta, order, vector=vector) * ((-1j) ** (deg + 1) / wavenumber * (-1.0) ** m)
+    into = far_profiles(theta, order, vector=vector).conj() * (4 * np.pi * 1j**deg)
     t, c, waves = out.shape
     of = [np.flatnonzero(m == one) for one in range(-order, order + 1)]
     # T by m' of what comes in: (m', waves, t, c)
@@ -122,8 +122,8 @@ def turn_blocks(rotation: FloatArray, order: int) -> list[ComplexArray]:
     x, w = gauss_sphere(2 * order)
     here, there = harmonics(x, order), harmonics(x @ rotation, order)
     blocks = []
-    for l in range(order + 1):  # noqa: E741
-        at = slice(l**2, (l + 1) ** 2)
+    for deg in range(order + 1):
+        at = slice(deg**2, (deg + 1) ** 2)
         blocks.append((here[:, at].conj() * w[:, None]).T @ there[:, at])
     return blocks
 
@@ -132,9 +132,9 @@ def turned(T: ComplexArray, rotation: FloatArray, order: int, *, vector: bool) -
     """The T-matrix of the body turned by a rotation (3, 3) about the centre."""
     n = count(order) - 1 if vector else count(order)
     D = np.zeros((n, n), dtype=complex)
-    for l, block in enumerate(turn_blocks(rotation, order)):  # noqa: E741
-        at = slice(l**2 - vector, (l + 1) ** 2 - vector)
-        if l or not vector:
+    for deg, block in enumerate(turn_blocks(rotation, order)):
+        at = slice(deg**2 - vector, (deg + 1) ** 2 - vector)
+        if deg or not vector:
             D[at, at] = block
     if not vector:
         return np.asarray(D @ T @ D.conj().T)
@@ -155,10 +155,10 @@ def recentred(
     x, w = gauss_sphere(order + larger + int(np.ceil(wavenumber * np.linalg.norm(shift))) + ALIAS)
     phase = np.exp(-1j * wavenumber * (x @ shift))
     # V(r) e^{-ikr.(c - c')} about c', by V' there; i's powers of both
-    l, _ = degrees_of(order, vector=vector)
+    deg, _ = degrees_of(order, vector=vector)
     m, _ = degrees_of(larger, vector=vector)
-    small, large = (far_table(x, n, vector=vector).reshape(-1, len(d)) for n, d in ((order, l), (larger, m)))
+    small, large = (far_table(x, n, vector=vector).reshape(-1, len(d)) for n, d in ((order, deg), (larger, m)))
     lanes = np.repeat(w * phase.conj(), 2 if vector else 1)[:, None]
     E = (large.conj() * lanes).T @ small
-    left = E * np.multiply.outer(1j ** (m + 1), (-1j) ** (l + 1))
-    return np.asarray(left @ T @ (1j**l[:, None] * E.conj().T * (-1j) ** m))
+    left = E * np.multiply.outer(1j ** (m + 1), (-1j) ** (deg + 1))
+    return np.asarray(left @ T @ (1j ** deg[:, None] * E.conj().T * (-1j) ** m))

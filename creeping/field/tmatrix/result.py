@@ -74,7 +74,7 @@ class Averages(NamedTuple):
     Attributes
     ----------
     backscattering, scattering, extinction : float
-        Of 4 pi |f(d, -d)|^2, of a conductor both polarisations scattered added; scattering and extinction cross sections.
+        Of 4 pi |f(d, -d)|^2, of a conductor both polarisations scattered added, and of those cross sections.
     """
 
     backscattering: float
@@ -178,8 +178,8 @@ class TMatrix:
     @property
     def _reversed(self) -> ComplexArray:
         """The T-matrix of the reversed field."""
-        l, m = degrees_of(self.order, vector=self.vector)
-        across = np.lexsort([np.arange(len(l)) % 2, -m, l]) if self.vector else np.lexsort([-m, l])
+        deg, m = degrees_of(self.order, vector=self.vector)
+        across = np.lexsort([np.arange(len(deg)) % 2, -m, deg]) if self.vector else np.lexsort([-m, deg])
         sign = (-1.0) ** m
         return np.asarray(sign[:, None] * self.matrix.T[np.ix_(across, across)] * sign)
 
@@ -321,9 +321,7 @@ class TMatrix:
         u, w = np.polynomial.legendre.leggauss(2 * L + 1)
         series = backward_series(T, k, np.arccos(u), L, vector=self.vector)
         mean = 0.5 * float(np.sum(w * np.sum(np.abs(series) ** 2, axis=(1, 2, 3)))) / len(series[0])
-        return Averages(
-            4 * np.pi * mean, share * float(np.linalg.norm(T)) ** 2, -share * float(np.trace(T).real)
-        )
+        return Averages(4 * np.pi * mean, share * float(np.linalg.norm(T)) ** 2, -share * float(np.trace(T).real))
 
     # --- other places
 
@@ -365,13 +363,13 @@ class TMatrix:
     def to_xarray(self) -> xarray.Dataset:
         """The matrix with names on its axes: degree and order of each wave, of a conductor its polarisation too."""
         library = required("xarray", use="labelled results need", extra="sweep")
-        l, m = degrees_of(self.order, vector=self.vector)
+        deg, m = degrees_of(self.order, vector=self.vector)
         names = ("outgoing", "incoming")
         coordinates: dict[str, Any] = {"center": ("axis", self.center, {"units": self.unit})}
         for name in names:
-            coordinates |= {f"degree_{name}": (name, l), f"order_{name}": (name, m)}
+            coordinates |= {f"degree_{name}": (name, deg), f"order_{name}": (name, m)}
             if self.vector:
-                coordinates[f"polarisation_{name}"] = (name, np.tile(["electric", "magnetic"], len(l) // 2))
+                coordinates[f"polarisation_{name}"] = (name, np.tile(["electric", "magnetic"], len(deg) // 2))
         words = {"wavenumber": self.wavenumber, "boundary": self.boundary, "body": self.body}
         words |= {"reciprocity": self.reciprocity, "unitarity": self.unitarity, "conventions": "exp(-i omega t)"}
         found: xarray.Dataset = library.Dataset({"T": (names, self.matrix)}, coordinates, words)

@@ -19,6 +19,7 @@ phases are those of treams and acoustotreams.
 Sources: [J98, sec. 9.7 and 9.12]; [DLMF, sec. 10.51 and 14.30].
 """
 
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -51,24 +52,24 @@ def degrees(order: int) -> tuple[IntArray, IntArray]:
     ([0, 1, 1, 1], [0, -1, 0, 1])
     """
     number = np.arange(count(order))
-    l = np.sqrt(number + 0.5).astype(np.int64)  # noqa: E741
-    return l, number - l * (l + 1)
+    deg = np.sqrt(number + 0.5).astype(np.int64)
+    return deg, number - deg * (deg + 1)
 
 
 def vector_degrees(order: int) -> tuple[IntArray, IntArray, IntArray]:
     """Degrees, orders and kinds, 1 electric and 0 magnetic, of the vector waves."""
-    l, m = (np.repeat(part[1:], 2) for part in degrees(order))
-    return l, m, np.tile([1, 0], len(l) // 2)
+    deg, m = (np.repeat(part[1:], 2) for part in degrees(order))
+    return deg, m, np.tile([1, 0], len(deg) // 2)
 
 
 def legendre(theta: FloatArray, order: int) -> FloatArray:
     """Y_lm(theta, 0) at polar angles (n,), radians, on the sphere or beyond its poles: (n, (order + 1)^2)."""
     from scipy.special import sph_legendre_p_all
 
-    l, m = degrees(order)
+    deg, m = degrees(order)
     table = sph_legendre_p_all(order, order, theta)[0]
     # of negative m by parity, which scipy keeps at the end of the axis
-    return np.ascontiguousarray(table[l, m].T)
+    return np.ascontiguousarray(table[deg, m].T)
 
 
 def harmonics(directions: FloatArray, order: int) -> ComplexArray:
@@ -87,7 +88,7 @@ def regular(points: FloatArray, wavenumber: float, order: int, *, radial: bool =
     from scipy.special import spherical_jn
 
     out = np.empty((len(points), count(order)), dtype=complex)
-    l, m = degrees(order)
+    deg, m = degrees(order)
 
     def work(part: slice) -> None:
         for first in range(part.start, part.stop, BLOCK):
@@ -98,7 +99,7 @@ def regular(points: FloatArray, wavenumber: float, order: int, *, radial: bool =
             turn = np.exp(1j * np.arctan2(x[:, 1], x[:, 0])[:, None] * np.arange(-order, order + 1))
             values = legendre(theta, order)
             if radial:
-                values *= spherical_jn(np.arange(order + 1), wavenumber * r[:, None])[:, l]
+                values *= spherical_jn(np.arange(order + 1), wavenumber * r[:, None])[:, deg]
             np.multiply(values, turn[:, m + order], out=out[at])
 
     in_threads(work, len(points), least=BLOCK, multiple=1, seconds=EACH * count(order))
@@ -109,12 +110,12 @@ def _ladder(order: int, up: IntArray, coefficients: FloatArray, low: FloatArray,
     """Sparse matrix of psi_lm -> ``low`` psi_(l-1, m+step) - ``coefficients`` psi_(l+1, m+step)."""
     from scipy.sparse import csr_array
 
-    l, m = degrees(order)
-    number = np.arange(len(l))
-    rows = [(l + 1) * (l + 2) + m + m_step]
+    deg, m = degrees(order)
+    number = np.arange(len(deg))
+    rows = [(deg + 1) * (deg + 2) + m + m_step]
     columns, entries = [number], [-coefficients]
-    there = (l >= 1) & (np.abs(m + m_step) <= l - 1)
-    rows.append(((l - 1) * l + m + m_step)[there])
+    there = (deg >= 1) & (np.abs(m + m_step) <= deg - 1)
+    rows.append(((deg - 1) * deg + m + m_step)[there])
     columns.append(number[there])
     entries.append(low[there])
     shape = (count(order + 1), count(order))
@@ -130,28 +131,28 @@ def gradients(order: int) -> tuple[Any, Any, Any]:
     >>> [part.shape for part in gradients(2)]
     [(16, 9), (16, 9), (16, 9)]
     """
-    l, m = (part.astype(float) for part in degrees(order))
-    above, below = (2 * l + 1) * (2 * l + 3), np.maximum((2 * l - 1) * (2 * l + 1), 1.0)
-    number = np.arange(len(l))
+    deg, m = (part.astype(float) for part in degrees(order))
+    above, below = (2 * deg + 1) * (2 * deg + 3), np.maximum((2 * deg - 1) * (2 * deg + 1), 1.0)
+    number = np.arange(len(deg))
     z = _ladder(
         order,
         number,
-        np.sqrt(((l + 1) ** 2 - m**2) / above),
-        np.sqrt(np.maximum(l**2 - m**2, 0.0) / below),
+        np.sqrt(((deg + 1) ** 2 - m**2) / above),
+        np.sqrt(np.maximum(deg**2 - m**2, 0.0) / below),
         0,
     )
     plus = _ladder(
         order,
         number,
-        -np.sqrt((l + m + 1) * (l + m + 2) / above),
-        np.sqrt(np.maximum((l - m) * (l - m - 1), 0.0) / below),
+        -np.sqrt((deg + m + 1) * (deg + m + 2) / above),
+        np.sqrt(np.maximum((deg - m) * (deg - m - 1), 0.0) / below),
         1,
     )
     minus = _ladder(
         order,
         number,
-        np.sqrt((l - m + 1) * (l - m + 2) / above),
-        -np.sqrt(np.maximum((l + m) * (l + m - 1), 0.0) / below),
+        np.sqrt((deg - m + 1) * (deg - m + 2) / above),
+        -np.sqrt(np.maximum((deg + m) * (deg + m - 1), 0.0) / below),
         -1,
     )
     return 0.5 * (plus + minus), -0.5j * (plus - minus), z
@@ -162,10 +163,10 @@ def momenta(order: int) -> tuple[Any, Any, Any]:
     """L_x, L_y and L_z of scalar waves: sparse ((order + 1)^2,) * 2 each."""
     from scipy.sparse import csr_array, diags_array
 
-    l, m = degrees(order)
-    n, number = len(l), np.arange(len(l))
-    up = m < l
-    raised = np.sqrt((l - m) * (l + m + 1.0))[up]
+    deg, m = degrees(order)
+    n, number = len(deg), np.arange(len(deg))
+    up = m < deg
+    raised = np.sqrt((deg - m) * (deg + m + 1.0))[up]
     plus = csr_array((raised.astype(complex), (number[up] + 1, number[up])), (n, n))
     minus = plus.T.tocsr()
     return 0.5 * (plus + minus), -0.5j * (plus - minus), diags_array(m.astype(complex)).tocsr()
@@ -176,8 +177,8 @@ def vector_parts(order: int) -> tuple[Any, Any, Any]:
     """x, y and z components of vector waves as scalar ones: sparse ((order + 2)^2, 2 order (order + 2)) each."""
     from scipy.sparse import csr_array, hstack
 
-    l, _ = degrees(order)
-    share = 1 / np.sqrt(np.maximum(l * (l + 1.0), 1.0))
+    deg, _ = degrees(order)
+    share = 1 / np.sqrt(np.maximum(deg * (deg + 1.0), 1.0))
     M = [csr_array(part * share[None])[:, 1:] for part in momenta(order)]
     D = gradients(order)
     lift = csr_array(
@@ -193,7 +194,7 @@ def vector_parts(order: int) -> tuple[Any, Any, Any]:
     return parts[0], parts[1], parts[2]
 
 
-def combined(table: ComplexArray, parts: tuple[Any, Any, Any], vectors: FloatArray) -> ComplexArray:
+def combined(table: ComplexArray, parts: Sequence[Any], vectors: FloatArray) -> ComplexArray:
     """sum_c v_c (table @ part_c) of waves (n, s), sparse parts (s, t) and vectors (n, 3): (n, t)."""
     rows = table.T
     out = np.zeros((parts[0].shape[1], len(table)), dtype=complex)
@@ -210,8 +211,8 @@ def far_vectors(directions: FloatArray, order: int) -> ComplexArray:
     from creeping.field.far_result import spherical_frame
 
     frame = spherical_frame(directions)
-    l, _ = degrees(order)
-    share = 1 / np.sqrt(np.maximum(l * (l + 1.0), 1.0))
+    deg, _ = degrees(order)
+    share = 1 / np.sqrt(np.maximum(deg * (deg + 1.0), 1.0))
     Y = harmonics(directions, order)
     X = np.stack([combined(Y, momenta(order), frame[:, c]) for c in (0, 1)], axis=1) * share
     return _both(X[:, :, 1:])
