@@ -33,7 +33,7 @@ from creeping.field.tmatrix.mirrors import mirrors_of, no_mirrors
 from creeping.field.tmatrix.result import TMatrix
 from creeping.field.tmatrix.solved_waves import SolvedWaves
 from creeping.field.tmatrix.spherical_waves import count, vector_count
-from creeping.geometry.arguments import real_array, whole_number
+from creeping.geometry.arguments import real_array, shown, whole_number
 from creeping.geometry.checks import unit_of
 from creeping.geometry.surface import Surface
 from creeping.kernels.threads import thread_count
@@ -143,7 +143,7 @@ def order_for(size: float, digits: float = DIGITS) -> int:
     Examples
     --------
     >>> [order_for(size) for size in (1e-3, 5.0, 30.0)]
-    [3, 10, 38]
+    [3, 10, 39]
     """
     return max(LEAST, int(np.ceil(size + 1.8 * digits ** (2 / 3) * np.cbrt(size))))
 
@@ -178,6 +178,6 @@ def _center(body: Surface, center: ArrayLike | None) -> FloatArray:
     if center is None:
         return np.asarray(np.mean(np.asarray(body.bounds, dtype=float), axis=0))
     given = real_array(center, "center")
-    if given.shape != (3,):
-        raise InvalidInputError(f"center has shape {given.shape}; give three numbers")
+    if given.shape != (3,) or not np.all(np.isfinite(given)):
+        raise InvalidInputError(f"center = {shown(center)} is not three numbers; give three finite numbers")
     return given

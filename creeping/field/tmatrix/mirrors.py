@@ -12,7 +12,7 @@ fields; of J, in components along tangents, whether these have the image's sign:
 
 so that (psi_lm +- psi_l-m)/2^(1/2) are even or odd; N of psi is as psi, and M, an axial vector, the other way.
 
-Sources: [SP90]; Derivations, F36.
+Sources: [K05]; Derivations, F36.
 """
 
 from itertools import product

@@ -14,6 +14,8 @@ directions gives both exactly.
 Sources: [MTL02, sec. 5.3]; [BMK19].
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray, IntArray
@@ -30,6 +32,44 @@ TOLERANCE = 1e-9
 """Of the Fourier transform, as a share of its largest value."""
 ALIAS = 12
 """Degrees beyond k|shift| that a phase e^{ikr.shift} has, about."""
+
+
+class Pattern(NamedTuple):
+    """Far fields and their errors, L: by incidence and direction, of a conductor (..., scattered, incident)."""
+
+    values: ComplexArray
+    error: FloatArray
+
+
+class Sections(NamedTuple):
+    """Cross sections, L^2: by incidence, of a conductor (m, 2) for E0 along theta and phi."""
+
+    scattering: FloatArray
+    extinction: FloatArray
+
+    @property
+    def absorption(self) -> FloatArray:
+        """Extinction less scattering."""
+        return np.asarray(self.extinction - self.scattering)
+
+
+class Averages(NamedTuple):
+    """Means over all orientations of the body, L^2, and of a conductor over both polarisations.
+
+    Attributes
+    ----------
+    backscattering, scattering, extinction : float
+        Of 4 pi |f(d, -d)|^2, of a conductor both polarisations scattered added, and of those cross sections.
+    """
+
+    backscattering: float
+    scattering: float
+    extinction: float
+
+    @property
+    def target_strength(self) -> float:
+        """10 log10(backscattering/4 pi), dB relative to L."""
+        return float(10 * np.log10(self.backscattering / (4 * np.pi)))
 
 
 def far_table(directions: FloatArray, order: int, *, vector: bool) -> ComplexArray:

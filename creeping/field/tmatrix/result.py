@@ -14,7 +14,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,8 +22,12 @@ from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import UNRESOLVED, observers_of
 from creeping.field.far_result import FarField
+from creeping.field.tmatrix.lack import Lack
 from creeping.field.tmatrix.patterns import (
+    Averages,
     Backward,
+    Pattern,
+    Sections,
     backward_series,
     degrees_of,
     received,
@@ -39,52 +43,10 @@ if TYPE_CHECKING:
     import xarray
 
 METHOD = "t-matrix"
-LEVEL = 3.0
-"""Error of f over its rms by what reciprocity and unitarity lack, with which 95 of 100 pairs of directions hold."""
-LEAST = 2e-5
-"""Error of f over its rms at least: integrals over tiles are no better."""
 ORTHOGONAL = 1e-9
 """What a rotation may lack of being one."""
 PAIRS = 4096
 """Pairs of directions that are summed together."""
-
-
-class Pattern(NamedTuple):
-    """Far fields and their errors, L: by incidence and direction, of a conductor (..., scattered, incident)."""
-
-    values: ComplexArray
-    error: FloatArray
-
-
-class Sections(NamedTuple):
-    """Cross sections, L^2: by incidence, of a conductor (m, 2) for E0 along theta and phi."""
-
-    scattering: FloatArray
-    extinction: FloatArray
-
-    @property
-    def absorption(self) -> FloatArray:
-        """Extinction less scattering."""
-        return np.asarray(self.extinction - self.scattering)
-
-
-class Averages(NamedTuple):
-    """Means over all orientations of the body, L^2, and of a conductor over both polarisations.
-
-    Attributes
-    ----------
-    backscattering, scattering, extinction : float
-        Of 4 pi |f(d, -d)|^2, of a conductor both polarisations scattered added, and of those cross sections.
-    """
-
-    backscattering: float
-    scattering: float
-    extinction: float
-
-    @property
-    def target_strength(self) -> float:
-        """10 log10(backscattering/4 pi), dB relative to L."""
-        return float(10 * np.log10(self.backscattering / (4 * np.pi)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -171,36 +133,23 @@ class TMatrix:
     # --- errors
 
     @cached_property
-    def reciprocity(self) -> float:
-        """What f(d, r) and f(-r, -d) differ by, as a share of f, rms over all pairs of directions."""
-        return float(np.linalg.norm(self.matrix - self._reversed) / np.linalg.norm(self.matrix))
+    def _lack(self) -> Lack:
+        return Lack(self.matrix, self.wavenumber, self.order, vector=self.vector, absorbing=self.absorbing)
 
     @property
-    def _reversed(self) -> ComplexArray:
-        """The T-matrix of the reversed field."""
-        deg, m = degrees_of(self.order, vector=self.vector)
-        across = np.lexsort([np.arange(len(deg)) % 2, -m, deg]) if self.vector else np.lexsort([-m, deg])
-        sign = (-1.0) ** m
-        return np.asarray(sign[:, None] * self.matrix.T[np.ix_(across, across)] * sign)
+    def reciprocity(self) -> float:
+        """What f(d, r) and f(-r, -d) differ by, as a share of f, rms over all pairs of directions."""
+        return self._lack.reciprocity
 
-    @cached_property
+    @property
     def unitarity(self) -> float:
         """Norm of S*S - 1 over that of S - 1; NaN of a body that absorbs."""
-        if self.absorbing:
-            return float("nan")
-        T = self.matrix
-        lacks = T + T.conj().T + 2 * T.conj().T @ T
-        return float(np.linalg.norm(lacks) / np.linalg.norm(T))
+        return self._lack.unitarity
 
-    @cached_property
+    @property
     def error(self) -> float:
-        """Error of f, L, that 95 of 100 pairs of directions keep to.
-
-        What the solution lacks is no more reciprocal than other matrices, and about half of it is not unitary.
-        """
-        mean = np.linalg.norm(self.matrix) / self.wavenumber
-        known = [part for part in (self.reciprocity, self.unitarity, LEAST) if np.isfinite(part)]
-        return float(LEVEL * np.linalg.norm(known) * mean)
+        """Error of f, L, rms over all pairs of directions, that 95 of 100 keep to; `bistatic` has it by direction."""
+        return self._lack.error
 
     # --- far fields
 
@@ -220,6 +169,11 @@ class TMatrix:
         -------
         Pattern
             (m, n), or (m,) of pairs; of a conductor (m, n, 2, 2): theta and phi scattered, theta and phi incident.
+
+        Raises
+        ------
+        InvalidInputError
+            On bad directions, if numbers of pairs differ, and if the result takes more memory than it may.
         """
         flag(pairs, "pairs")
         d = unit_directions(directions, "directions of incidence").reshape(-1, 3)
@@ -228,30 +182,41 @@ class TMatrix:
         if pairs and len(d) != len(r):
             raise InvalidInputError(f"{len(d)} incidences and {len(r)} directions are no pairs")
         if not pairs:
-            within_budget(40.0 * c * c * len(d) * len(r), f"{len(d)} x {len(r)} far fields", "ask for fewer at a time")
-        found = np.empty((len(d), c, c) if pairs else (len(d), len(r), c, c), dtype=complex)
+            within_budget(80.0 * c * c * len(d) * len(r), f"{len(d)} x {len(r)} far fields", "ask for fewer at a time")
+        shape = (len(d), c, c) if pairs else (len(d), len(r), c, c)
+        found, lack = np.empty(shape, dtype=complex), np.empty(shape)
         for first in range(0, len(d), PAIRS):
             at = slice(first, first + PAIRS)
-            came = self.matrix @ self._received(d[at]).reshape(-1, len(self.matrix)).T
+            a = self._received(d[at]).reshape(-1, len(self.matrix)).T
+            came, lacks = self.matrix @ a, self._lack.of @ a
             if pairs:
-                came = came.reshape(len(self.matrix), -1, c)
-                found[at] = np.einsum("now,wni->noi", self._sent(r[at]), came)
+                out = self._sent(r[at])
+                own = [np.einsum("now,wni->noi", out, lane.reshape(len(lane), -1, c)) for lane in (came, lacks)]
+                found[at], lack[at] = own[0], np.abs(own[1])
                 continue
             for start in range(0, len(r), PAIRS):
                 part = slice(start, start + PAIRS)
                 out = self._sent(r[part])
-                both = (out.reshape(-1, len(self.matrix)) @ came).reshape(len(out), c, -1, c)
-                found[at, part] = np.moveaxis(both, 2, 0)
-        values = found if self.vector else found[..., 0, 0]
-        return Pattern(values, np.full(values.shape, self.error))
+                rows = out.reshape(-1, len(self.matrix))
+                each = [np.moveaxis((rows @ lane).reshape(len(out), c, -1, c), 2, 0) for lane in (came, lacks)]
+                found[at, part], lack[at, part] = each[0], np.abs(each[1])
+        error = self._lack.error_of(lack, d, r, pairs=pairs)
+        return Pattern(*((found, error) if self.vector else (found[..., 0, 0], error[..., 0, 0])))
 
     def far_field(self, direction: ArrayLike, observation: ArrayLike) -> FarField:
-        """Far field of one incidence (3,) in directions (..., 3), with its error: as of `creeping.far_field`."""
+        """Far field of one incidence (3,) in directions (..., 3), with its error: as of `creeping.far_field`.
+
+        Raises
+        ------
+        InvalidInputError
+            On bad directions, and for several incidences.
+        """
         d = unit_directions(direction, "direction of incidence").reshape(-1, 3)
         if len(d) != 1:
             raise InvalidInputError(f"far_field is of one incidence, not {len(d)}; bistatic is of many")
         r = observers_of(observation)
-        return self._far(r, self.bistatic(d, r).values[0])
+        found = self.bistatic(d, r)
+        return self._far(r, found.values[0], found.error[0])
 
     def backscatter(self, directions: ArrayLike) -> FarField:
         """Far field of each incidence (m, 3) back to where it comes from, in directions -d.
@@ -265,21 +230,23 @@ class TMatrix:
             # at the poles phi is 0 both of d and of -d, by convention: theta and phi of -d turn about
             found[np.hypot(d[:, 0], d[:, 1]) < 1e-12] *= -1
         found = found * np.exp(2j * self.wavenumber * (d @ self.center))[:, None, None]
-        return self._far(-d, found if self.vector else found[:, 0, 0])
+        error = self._lack.backward_error(d)
+        error = np.broadcast_to(error[:, None, None], found.shape).copy()
+        return self._far(-d, *((found, error) if self.vector else (found[:, 0, 0], error[:, 0, 0])))
 
     @cached_property
     def _backward(self) -> Backward:
         return Backward(self.matrix, self.wavenumber, self.order, vector=self.vector)
 
-    def _far(self, r: FloatArray, total: ComplexArray) -> FarField:
-        large = np.sqrt(4 * np.pi) * np.max(np.abs(total), initial=0.0)
+    def _far(self, r: FloatArray, total: ComplexArray, error: FloatArray) -> FarField:
+        off = ~(error < UNRESOLVED * np.max(np.abs(total), initial=self._lack.mean))
         return FarField(
             directions=np.array(r),
             total=total,
             parts={},
             method=np.full(len(r), METHOD),
-            unresolved=np.full(len(r), not self.error < UNRESOLVED * large),
-            error=np.full(total.shape, self.error),
+            unresolved=off.any(axis=tuple(range(1, off.ndim))),
+            error=error,
             error_by="reciprocity and unitarity",
             wavenumber=self.wavenumber,
             boundary=self.boundary,
@@ -300,7 +267,7 @@ class TMatrix:
     # --- cross sections
 
     def cross_sections(self, directions: ArrayLike) -> Sections:
-        """Scattering, extinction and absorption cross sections of incidences (m, 3)."""
+        """Scattering, extinction and absorption cross sections, L^2, of incidences (m, 3), which need not be unit."""
         d = unit_directions(directions, "directions of incidence").reshape(-1, 3)
         scattering, extinction = [], []
         for first in range(0, len(d), PAIRS):
@@ -326,7 +293,13 @@ class TMatrix:
     # --- other places
 
     def rotate(self, rotation: ArrayLike) -> TMatrix:
-        """That of the body turned about the origin by a rotation (3, 3), which takes its points x to R x."""
+        """That of the body turned about the origin by a rotation (3, 3), which takes its points x, L, to R x.
+
+        Raises
+        ------
+        InvalidInputError
+            If it is no rotation.
+        """
         R = real_array(rotation, "rotation")
         if R.shape != (3, 3) or np.max(np.abs(R @ R.T - np.eye(3))) > ORTHOGONAL or np.linalg.det(R) < 0:
             raise InvalidInputError("rotation is no rotation: give a matrix (3, 3) with R R^T = 1 and determinant 1")
@@ -334,7 +307,13 @@ class TMatrix:
         return replace(self, matrix=T, center=R @ self.center, body=self._moved("turned"))
 
     def translate(self, shift: ArrayLike) -> TMatrix:
-        """That of the body moved by a vector (3,), L: its centre moves along."""
+        """That of the body moved by a vector (3,), L: its centre moves along.
+
+        Raises
+        ------
+        InvalidInputError
+            If the vector is not three numbers.
+        """
         v = real_array(shift, "shift")
         if v.shape != (3,):
             raise InvalidInputError(f"shift has shape {v.shape}; give three numbers")
@@ -344,6 +323,11 @@ class TMatrix:
         """That of the same body by waves about another centre (3,), L.
 
         Unless given, the order is that of a body of which the new centre is farther away.
+
+        Raises
+        ------
+        InvalidInputError
+            If the centre is not three numbers, the order no whole number, or the matrix too large.
         """
         c = real_array(center, "center")
         if c.shape != (3,):

@@ -134,7 +134,7 @@ class SolvedWaves:
 
         def add(at: Any, rows: np.ndarray, factor: complex) -> None:
             """Rows of the matrix, added up over images: sums and differences, one plane after the other."""
-            each = np.stack([rows[:, order] * sign for order, sign in zip(columns, signs, strict=True)])
+            each: Any = np.stack([rows[:, order] * sign for order, sign in zip(columns, signs, strict=True)])
             each *= factor
             planes = each.reshape(*(2,) * len(mirrors.axes), *each.shape[1:])
             for axis in range(len(mirrors.axes)):

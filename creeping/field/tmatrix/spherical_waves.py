@@ -4,10 +4,10 @@
     e^{ikd.x} = 4 pi sum i^l psi_lm(x) conj Y_lm(d),   h_l(kr) -> (-i)^(l+1) e^{ikr}/(kr)
 
 Y is that of `scipy.special.sph_harm_y`: normalised, with the phase (-1)^m. A derivative of a wave is a sum of waves of
-the degrees next to it. As regular waves are sums of plane ones, d/dx multiplies these by i d_x, so that with what d_x
-makes of Y_lm,
+the degrees next to it. As regular waves are sums of plane ones, d/dx multiplies these by i d_x, and with what d_x makes
+of Y_lm,
 
-    d_z Y_lm = sum c Y_l'm   ->   (1/k) dpsi_lm/dz = sum c (-1)^{(l' - l + 1)/2 ...} psi_l'm:  + c down, - c up
+    d_z Y_lm = a Y_l+1,m + b Y_l-1,m   ->   (1/k) d/dz psi_lm = -a psi_l+1,m + b psi_l-1,m
 
 and so for d_x +- i d_y. Angular momentum L = -i x cross grad does not change the degree. Vector waves are
 
@@ -16,7 +16,7 @@ and so for d_x +- i d_y. Angular momentum L = -i x cross grad does not change th
 the magnetic and the electric multipoles, numbered 2 (l^2 + l + m - 1) for N and one more for M. Waves, numbers and
 phases are those of treams and acoustotreams.
 
-Sources: [J98, sec. 9.7 and 9.12]; [DLMF, sec. 10.51 and 14.30].
+Sources: [J98, sec. 9.6 and 9.7]; [BFR24].
 """
 
 from collections.abc import Sequence

@@ -13,7 +13,7 @@ and acoustotreams takes the arrays. Waves may stand in any order; waves of a deg
 
 A file is data: sizes are checked before arrays are read, and nothing in it is executed.
 
-Sources: [AFB24]; treams 0.4.7, `treams.io`.
+Sources: [BFR24], treams 0.4.7, `treams.io`.
 """
 
 # help() shows names of types instead of what they stand for
@@ -58,7 +58,7 @@ def write_t_matrix(T: TMatrix, path: str | os.PathLike[str]) -> None:
     CreepingError
         If h5py is missing, or the file cannot be written.
     """
-    h5py = required("h5py", use="T-matrices are stored by", extra="sweep")
+    h5py = required("h5py", use="T-matrices are stored by", extra="tmatrix")
     with written_aside(path) as aside, h5py.File(aside, "w") as file:
         file.attrs["storage_format_version"] = "v1"
         file.attrs["name"] = T.body or "T-matrix"
@@ -97,7 +97,7 @@ def read_t_matrix(path: str | os.PathLike[str]) -> dict[str, Any]:
     InvalidInputError
         If it is no T-matrix of one body, wavenumber and centre, or too large.
     """
-    h5py = required("h5py", use="T-matrices are stored by", extra="sweep")
+    h5py = required("h5py", use="T-matrices are stored by", extra="tmatrix")
     try:
         with h5py.File(Path(path), "r") as file:
             return _read(file, h5py)

@@ -24,18 +24,18 @@ BOUNDARIES = ["soft", "hard", cr.ImpedanceBoundary(0.6), "pec"]
 
 def series(ka, order, boundary):
     """Diagonal of a sphere's T-matrix."""
-    l = np.arange(order + 1)
-    j, dj = spherical_jn(l, ka), spherical_jn(l, ka, True)
-    h, dh = j + 1j * spherical_yn(l, ka), dj + 1j * spherical_yn(l, ka, True)
+    deg = np.arange(order + 1)
+    j, dj = spherical_jn(deg, ka), spherical_jn(deg, ka, True)
+    h, dh = j + 1j * spherical_yn(deg, ka), dj + 1j * spherical_yn(deg, ka, True)
     if boundary == "pec":
-        l, _, electric = vector_degrees(order)
-        return np.where(electric == 1, -((j + ka * dj) / (h + ka * dh))[l], -(j / h)[l])
-    l, _ = degrees(order)
+        deg, _, electric = vector_degrees(order)
+        return np.where(electric == 1, -((j + ka * dj) / (h + ka * dh))[deg], -(j / h)[deg])
+    deg, _ = degrees(order)
     if boundary == "soft":
-        return -(j / h)[l]
+        return -(j / h)[deg]
     eta = 0.0 if boundary == "hard" else 0.6
     # du/dn = -ik eta u
-    return -((dj + 1j * eta * j) / (dh + 1j * eta * h))[l]
+    return -((dj + 1j * eta * j) / (dh + 1j * eta * h))[deg]
 
 
 @pytest.mark.parametrize(

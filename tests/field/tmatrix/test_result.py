@@ -15,8 +15,8 @@ POLES = np.array([[0, 0, 1.0], [0, 0, -1.0], [0.1, 0.2, 0.3], [1, 0, 0]])
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 
 
-@pytest.fixture(scope="module", params=["hard", "pec"])
-def T(request):
+@pytest.fixture(name="T", scope="module", params=["hard", "pec"])
+def of_an_ellipsoid(request):
     # any matrix will do, a reciprocal and lossless one tells more
     return cr.t_matrix(sc.Ellipsoid(0.5, 0.4, 0.3), wavenumber=3.0, boundary=request.param, center=(0.1, 0.0, 0.05))
 
@@ -101,7 +101,7 @@ def test_another_centre_is_the_same_field(T):
     moved = T.about((0.2, -0.3, 0.1), T.order + 6)
     assert np.abs(moved.bistatic(D, R).values - T.bistatic(D, R).values).max() < 1e-5
     assert np.abs(moved.about(T.center, T.order).matrix - T.matrix).max() < 1e-5
-    assert T.about((0.2, -0.3, 0.1)).order == T.order + 2
+    assert T.about((0.2, -0.3, 0.1)).order == T.order + 1
 
 
 def test_reciprocity_sees_what_is_not_reciprocal(T):
@@ -127,7 +127,7 @@ def test_bad_questions_are_refused(T):
         T.far_field(D, R)
     with pytest.raises(cr.InvalidInputError, match="no pairs"):
         T.bistatic(D, R[:2], pairs=True)
-    with pytest.raises(cr.InvalidInputError, match="zero vector"):
+    with pytest.raises(cr.InvalidInputError, match="is zero"):
         T.backscatter([(0, 0, 0)])
     with pytest.raises(cr.InvalidInputError, match="no rotation"):
         T.rotate(-np.eye(3))

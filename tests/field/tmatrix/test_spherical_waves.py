@@ -45,25 +45,25 @@ def test_gradients_are_those_of_differences(axis):
 def test_a_plane_wave_is_a_sum_of_scalar_waves():
     d = X / np.linalg.norm(X, axis=1, keepdims=True)
     y = 0.5 * RNG.normal(size=(4, 3))
-    l, _ = degrees(20)
-    found = (4 * np.pi * 1j**l * harmonics(d, 20).conj()) @ regular(y, K, 20).T
+    deg, _ = degrees(20)
+    found = (4 * np.pi * 1j**deg * harmonics(d, 20).conj()) @ regular(y, K, 20).T
     assert np.abs(found - np.exp(1j * K * (d @ y.T))).max() < 1e-12
 
 
 def test_a_plane_wave_is_a_sum_of_vector_waves():
     d = X / np.linalg.norm(X, axis=1, keepdims=True)
     y = 0.3 * RNG.normal(size=(4, 3))
-    l, _, _ = vector_degrees(16)
+    deg, _, _ = vector_degrees(16)
     waves = np.stack([(part.T @ regular(y, K, 17).T).T for part in vector_parts(16)], axis=1)
-    found = np.einsum("yxw,ncw->nycx", 4 * np.pi * 1j**l * waves, far_vectors(d, 16).conj())
+    found = np.einsum("yxw,ncw->nycx", 4 * np.pi * 1j**deg * waves, far_vectors(d, 16).conj())
     want = np.exp(1j * K * (d @ y.T))[:, :, None, None] * spherical_frame(d)[:, None]
     assert np.abs(found - want).max() < 1e-12
 
 
 @pytest.mark.parametrize("wave", list(TREAMS))
 def test_phases_are_those_of_treams(wave):
-    l, m = wave
-    number = 2 * (l * (l + 1) + m - 1)
+    deg, m = wave
+    number = 2 * (deg * (deg + 1) + m - 1)
     table = regular(np.array([[0.3, -0.7, 0.5]]), 2.5, 6)
     found = np.concatenate([(part.T @ table.T).T for part in vector_parts(5)])
     M, N = TREAMS[wave]
@@ -72,6 +72,6 @@ def test_phases_are_those_of_treams(wave):
 
 def test_at_the_centre_and_on_the_axis():
     at = regular(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, -2.0]]), K, 4)
-    l, m = degrees(4)
+    _, m = degrees(4)
     assert np.all(np.isfinite(at)) and at[0, 0] == pytest.approx(1 / np.sqrt(4 * np.pi))
     assert np.abs(at[0, 1:]).max() == 0 and np.abs(at[1, m != 0]).max() < 1e-15

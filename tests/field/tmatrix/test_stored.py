@@ -14,8 +14,8 @@ CLUSTER = Path(__file__).parent / "treams_cluster.tmat.h5"
 """Two spheres of permittivity 4 and 6, k = 1.3, order 4, written by treams 0.4.7."""
 
 
-@pytest.fixture(scope="module", params=["soft", "pec"])
-def T(request):
+@pytest.fixture(name="T", scope="module", params=["soft", "pec"])
+def of_an_ellipsoid(request):
     return cr.t_matrix(sc.Ellipsoid(0.5, 0.4, 0.3), wavenumber=2.0, boundary=request.param, center=(0.1, 0.0, 0.2))
 
 
@@ -33,7 +33,7 @@ def test_the_layout_is_that_of_treams(T, tmp_path):
     T.save(path)
     with h5py.File(path) as file, h5py.File(CLUSTER) as other:
         assert file["angular_vacuum_wavenumber"].attrs["unit"] == "m^{-1}"
-        assert set(file["modes"]) == {"l", "m", "positions"} | {"polarization"} * T.vector
+        assert set(file["modes"]) == {"l", "m", "positions", *["polarization"] * T.vector}
         assert set(other["modes"]) - set(file["modes"]) <= {"polarization"}
         assert file["embedding/relative_permittivity"][()] == file["embedding/relative_permeability"][()] == 1
         if T.vector:
