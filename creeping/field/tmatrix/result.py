@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
+from creeping._typing import ArrayLike, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import UNRESOLVED, observers_of
 from creeping.field.far_result import FarField
@@ -29,7 +29,6 @@ from creeping.field.tmatrix.patterns import (
     Pattern,
     Sections,
     backward_series,
-    degrees_of,
     received,
     recentred,
     sent,
@@ -37,7 +36,7 @@ from creeping.field.tmatrix.patterns import (
 )
 from creeping.geometry.arguments import flag, real_array, whole_number
 from creeping.geometry.directions import angles_of, unit_directions
-from creeping.storage.memory import required, within_budget
+from creeping.storage.memory import within_budget
 
 if TYPE_CHECKING:
     import xarray
@@ -346,18 +345,9 @@ class TMatrix:
 
     def to_xarray(self) -> xarray.Dataset:
         """The matrix with names on its axes: degree and order of each wave, of a conductor its polarisation too."""
-        library = required("xarray", use="labelled results need", extra="sweep")
-        deg, m = degrees_of(self.order, vector=self.vector)
-        names = ("outgoing", "incoming")
-        coordinates: dict[str, Any] = {"center": ("axis", self.center, {"units": self.unit})}
-        for name in names:
-            coordinates |= {f"degree_{name}": (name, deg), f"order_{name}": (name, m)}
-            if self.vector:
-                coordinates[f"polarisation_{name}"] = (name, np.tile(["electric", "magnetic"], len(deg) // 2))
-        words = {"wavenumber": self.wavenumber, "boundary": self.boundary, "body": self.body}
-        words |= {"reciprocity": self.reciprocity, "unitarity": self.unitarity, "conventions": "exp(-i omega t)"}
-        found: xarray.Dataset = library.Dataset({"T": (names, self.matrix)}, coordinates, words)
-        return found
+        from creeping.field.tmatrix.stored import as_dataset
+
+        return as_dataset(self)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write it as an HDF5 file that treams reads: see `creeping.field.tmatrix.stored`."""

@@ -28,11 +28,14 @@ import numpy as np
 from creeping._typing import Any, ComplexArray, IntArray
 from creeping._version import __version__
 from creeping.errors import CreepingError, InvalidInputError
+from creeping.field.tmatrix.patterns import degrees_of
 from creeping.field.tmatrix.spherical_waves import count, degrees, vector_count, vector_degrees
 from creeping.storage.atomic import written_aside
 from creeping.storage.memory import required, within_budget
 
 if TYPE_CHECKING:
+    import xarray
+
     from creeping.field.tmatrix.result import TMatrix
 
 INVERSE_METRES = {"nm^{-1}": 1e9, "um^{-1}": 1e6, "µm^{-1}": 1e6, "mm^{-1}": 1e3, "cm^{-1}": 1e2, "m^{-1}": 1.0}
@@ -85,6 +88,22 @@ def write_t_matrix(T: TMatrix, path: str | os.PathLike[str]) -> None:
         scatterer.attrs["name"] = T.body or "body"
         scatterer.create_group("geometry").attrs["unit"] = "m"
         scatterer.create_group("material").attrs["name"] = T.boundary
+
+
+def as_dataset(T: TMatrix) -> xarray.Dataset:
+    """The matrix with names on its axes: see `TMatrix.to_xarray`."""
+    library = required("xarray", use="labelled results need", extra="sweep")
+    deg, m = degrees_of(T.order, vector=T.vector)
+    names = ("outgoing", "incoming")
+    coordinates: dict[str, Any] = {"center": ("axis", T.center, {"units": T.unit})}
+    for name in names:
+        coordinates |= {f"degree_{name}": (name, deg), f"order_{name}": (name, m)}
+        if T.vector:
+            coordinates[f"polarisation_{name}"] = (name, np.tile(["electric", "magnetic"], len(deg) // 2))
+    words = {"wavenumber": T.wavenumber, "boundary": T.boundary, "body": T.body}
+    words |= {"reciprocity": T.reciprocity, "unitarity": T.unitarity, "conventions": "exp(-i omega t)"}
+    found: xarray.Dataset = library.Dataset({"T": (names, T.matrix)}, coordinates, words)
+    return found
 
 
 def read_t_matrix(path: str | os.PathLike[str]) -> dict[str, Any]:
