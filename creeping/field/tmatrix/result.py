@@ -190,7 +190,11 @@ class TMatrix:
             came, lacks = self.matrix @ a, self._lack.of @ a
             if pairs:
                 out = self._sent(r[at])
-                own = [np.einsum("now,wni->noi", out, lane.reshape(len(lane), -1, c)) for lane in (came, lacks)]
+                lanes = (lane.reshape(len(lane), -1, c) for lane in (came, lacks))
+                own = [
+                    np.stack([np.sum(out * one.T[:, None], axis=2) for one in np.moveaxis(lane, 2, 0)], axis=2)
+                    for lane in lanes
+                ]
                 found[at], lack[at] = own[0], np.abs(own[1])
                 continue
             for start in range(0, len(r), PAIRS):
