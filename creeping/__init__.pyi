@@ -44,6 +44,8 @@ from .field.ports.port_map import PortField as PortField
 from .field.ports.port_map import port_field as port_field
 from .field.sources import SourcePattern as SourcePattern
 from .field.sources import source_pattern as source_pattern
+from .field.tmatrix.computing import t_matrix as t_matrix
+from .field.tmatrix.result import TMatrix as TMatrix
 from .field.uncertainty import far_field_uncertainty as far_field_uncertainty
 from .field.validity_range import Validity as Validity
 from .field.validity_range import validity as validity

@@ -325,7 +325,7 @@ class _OnTiles(SurfaceCurrents):
     def inner_points(self) -> FloatArray:
         """Points inside the body at which the currents are judged (m, 3), L."""
         if self.matrix.inside is None:
-            self.matrix.inside = _inside(self.body, self.matrix.tiles, 2 * np.pi / self.wavenumber)
+            self.matrix.inside = inside_points(self.body, self.matrix.tiles, 2 * np.pi / self.wavenumber)
         return self.matrix.inside
 
     @cached_property
@@ -366,7 +366,7 @@ def _on_tiles(tiles: Tiles, own: tuple[IntArray, FloatArray, FloatArray]) -> Pla
     return Places.at(x, normals, own)
 
 
-def _inside(body: Surface, tiles: Tiles, wavelength: float) -> FloatArray:
+def inside_points(body: Surface, tiles: Tiles, wavelength: float) -> FloatArray:
     """Points inside a body (m, 3), L, evenly spread, as deep as it is thick enough for."""
     x = box_points(body, tiles.inside if tiles.alone else None)
     away, nearest = tiles.fine_tree.query(x)

@@ -67,6 +67,10 @@ STRAIGHT = 0.02
 """Angle between two faces, radians, below which there is no edge to speak of."""
 
 
+TIE = 1e-9
+"""Difference of parts of a normal below which they are one."""
+
+
 class Rings(NamedTuple):
     """Nodes of tiles on both faces of edges, at m places along them.
 
@@ -195,7 +199,8 @@ class Places(NamedTuple):
         cls, points: FloatArray, normals: FloatArray, own: tuple[IntArray, FloatArray, FloatArray] | None = None
     ) -> "Places":
         """Places at points with normals (m, 3)."""
-        spare = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
+        # where two parts are one but for rounding the first serves, so that mirrored normals have mirrored tangents
+        spare = np.eye(3)[np.argmin(np.abs(normals) + TIE * np.arange(3), axis=1)]
         a = spare - np.sum(spare * normals, axis=1, keepdims=True) * normals
         a /= np.linalg.norm(a, axis=1, keepdims=True)
         return cls(points, normals, a, np.cross(normals, a), own)

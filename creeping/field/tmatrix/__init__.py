@@ -1,0 +1,1 @@
+"""T-matrices: what a body scatters of every incident wave at once."""

@@ -1,0 +1,185 @@
+"""The T-matrix of a body: its integral equation solved for every regular wave at once.
+
+    scalar      p_lm = ik int [u d/dn - du/dn] (j_l conj Y_lm) dS,   u or du/dn of incoming psi_l'm'
+    conductor   p = -k^2 int conj(V).J dS,   V = N_lm or M_lm regular,   J of incoming E = V', H = curl E/(ik)
+
+since G = ik sum h_l Y_lm(x) j_l conj Y_lm(y), and the same with N and M for E; all about one centre. The right sides of
+the equation are regular waves at the nodes and at the points beneath them. Its matrix is factorised where memory holds
+it; else GMRES serves for blocks of waves.
+
+A body of radius R scatters waves of degrees up to kR, and of those beyond less by a factor that falls faster than
+exponentially, over a width of (kR)^(1/3): that of Airy's function, which j_l is next to l = kR.
+
+Sources: [W71]; [MTL02, sec. 5.8]; Derivations, F36.
+"""
+
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from creeping._typing import ArrayLike, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.field.arguments import checked, checked_plain
+from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, boundary_name, scalar_boundaries
+from creeping.field.equation.body_tiles import body_tiles
+from creeping.field.equation.currents import inside_points
+from creeping.field.equation.matrix import EACH, VECTOR, Matrix
+from creeping.field.equation.solving import PER_NODE, PRODUCTS, SUM, SUM_VECTOR
+from creeping.field.tmatrix.mirrors import mirrors_of, no_mirrors
+from creeping.field.tmatrix.result import TMatrix
+from creeping.field.tmatrix.solved_waves import SolvedWaves
+from creeping.field.tmatrix.spherical_waves import count, vector_count
+from creeping.geometry.arguments import real_array, shown, whole_number
+from creeping.geometry.checks import unit_of
+from creeping.geometry.surface import Surface
+from creeping.kernels.threads import thread_count
+from creeping.storage.memory import budget, within_budget
+
+SECONDS = 300.0
+"""What it may take, unless the caller says."""
+DIGITS = 2.0
+"""Digits that waves of the degrees kept give: of a flat-ended cylinder, k = 5, 10 and 20, f lacks 8e-5, 2e-5 and 3e-5
+of the largest at 1600 pairs of directions for want of higher ones."""
+FINER = 1.03
+"""Wavenumber of the tiles, over that of the waves: entries of a sphere, ka = 20, err by 2e-4 of the largest at 1."""
+LEAST = 3
+"""Degrees at least."""
+RATE, PER_SUM = 3e10, 4e-9
+"""Single-precision operations that LAPACK does in a second on a core, and seconds of a sum over images, about."""
+DENSE = 0.7
+"""Share of the memory that the factors and the waves at the nodes may take."""
+
+
+def t_matrix(
+    body: Surface,
+    *,
+    wavenumber: float,
+    boundary: BoundaryLike,
+    center: ArrayLike | None = None,
+    order: int | None = None,
+    seconds: float = SECONDS,
+    progress: Callable[[str], None] | None = None,
+) -> TMatrix:
+    """What a body scatters of every incident wave at once, by its integral equation.
+
+    Parameters
+    ----------
+    body : Surface
+        Smooth, or of pieces with edges, joints and tips.
+    wavenumber : float, 1/L
+    boundary : "soft", "hard", "pec" or ImpedanceBoundary
+    center : (3,), L, optional
+        Of the spherical waves; the middle of the body's bounds unless given.
+    order : int, optional
+        Highest degree of the waves; by default far fields err by less than 1e-4 of the largest for want of higher ones.
+    seconds : float
+        What it may take, about, with all cores; more is refused before it starts.
+    progress : callable, optional
+        Is told in words what is done, with the number of nodes, the time and the memory that it takes.
+
+    Returns
+    -------
+    TMatrix
+
+    Raises
+    ------
+    InvalidInputError
+        On bad arguments, for a weighted body, and if it would take more time or memory than it may.
+    SurfaceError
+        If the body has no mesh.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> T = cr.t_matrix(sc.Sphere(), wavenumber=2.0, boundary="soft")
+    >>> T.order, T.matrix.shape, bool(T.unitarity < 1e-3)
+    (6, (49, 49), True)
+    >>> far = T.far_field((0, 0, 1), [(0, 0, -1), (1, 0, 0)])
+    >>> far.method.tolist(), bool(far.error.max() < 0.01 * abs(far.total).max())
+    (['t-matrix', 't-matrix'], True)
+    """
+    checked_plain(body)
+    kinds = scalar_boundaries(boundary)
+    k = checked(wavenumber, 2)
+    tell = progress or (lambda words: None)
+    kind = CONDUCTOR if len(kinds) == 2 else kinds[0]
+    tiles = body_tiles(body, FINER * k, kind)
+    middle = _center(body, center)
+    radius = float(np.max(np.linalg.norm(tiles.points - middle, axis=1)))
+    degree = order_for(k * radius) if order is None else whole_number(order, "order")
+    matrix = Matrix(tiles, k, kind)
+    mirrors = mirrors_of(matrix, middle)
+    plan = plan_for(len(tiles.points), kind, degree, len(mirrors.images))
+    what = f"the T-matrix of order {degree} at wavenumber {k:g} by {len(tiles.points)} nodes"
+    if plan.seconds > seconds:
+        raise InvalidInputError(
+            f"{what} takes about {plan.seconds:.2g} s, more than the {seconds:g} s that it may take; give seconds=, "
+            "or a lower wavenumber; creeping.solve and rays serve for few incidences"
+        )
+    within_budget(plan.memory, what, "lower the wavenumber, or let creeping.solve serve for few incidences")
+    tell(f"{what}: about {plan.seconds:.2g} s and {plan.memory / 1e9:.2g} GB")
+    planes = mirrors if plan.direct else no_mirrors(matrix)
+    solved = SolvedWaves(matrix, middle, degree, planes, tell, direct=plan.direct)
+    tell("what is left inside")
+    return TMatrix(
+        matrix=solved.T,
+        wavenumber=k,
+        center=middle,
+        boundary=boundary_name(boundary),
+        vector=kind.kind == "conductor",
+        body=" ".join(repr(body).split()),
+        extinction=solved.extinction(inside_points(body, tiles, 2 * np.pi / k)),
+        absorbing=kind.kind == "impedance",
+        unit=unit_of(body),
+    )
+
+
+def order_for(size: float, digits: float = DIGITS) -> int:
+    """Highest degree of waves for a body of kR = ``size``.
+
+    Examples
+    --------
+    >>> [order_for(size) for size in (1e-3, 5.0, 30.0)]
+    [3, 10, 39]
+    """
+    return max(LEAST, int(np.ceil(size + 1.8 * digits ** (2 / 3) * np.cbrt(size))))
+
+
+class Plan(NamedTuple):
+    """Seconds and bytes that a T-matrix takes, about, and whether by factors of the whole matrix."""
+
+    seconds: float
+    memory: float
+    direct: bool
+
+
+def plan_for(nodes: int, kind: Boundary, order: int, parts: int = 1) -> Plan:
+    """What a T-matrix from so many nodes takes, of a body of so many parts that are images of each other."""
+    c = 2 if kind.kind == "conductor" else 1
+    n, waves = float(c * nodes), float(vector_count(order) if c == 2 else count(order))
+    # values of all waves, waves at the nodes of a part, and the matrix itself
+    tables = 8 * n * waves + 80 * n * waves / parts + 64 * waves**2 + 2e4 * n
+    memory = 8 * n**2 / parts + tables
+    if memory <= DENSE * budget():
+        pairs = 2 * float(nodes) ** 2 * EACH * (VECTOR if c == 2 else 1.0) + 2 * nodes * PER_NODE * c
+        own, each = n / parts, waves / parts
+        solved = 8 / 3 * own**3 + 8 * own**2 * each + 8 * own * each**2
+        added = 2 * n**2 / parts * (2 + np.log2(parts)) * PER_SUM
+        return Plan((pairs / parts + parts * solved / RATE + added) / thread_count(), memory, True)
+    each = SUM_VECTOR if c == 2 else SUM
+    seconds = 2 * nodes * PER_NODE * c / thread_count() + PRODUCTS * waves * each * nodes
+    return Plan(seconds, 80 * n * waves + 2e4 * n, False)
+
+
+def _center(body: Surface, center: ArrayLike | None) -> FloatArray:
+    if center is None:
+        return np.asarray(np.mean(np.asarray(body.bounds, dtype=float), axis=0))
+    given = real_array(center, "center")
+    if given.shape != (3,) or not np.all(np.isfinite(given)):
+        raise InvalidInputError(f"center = {shown(center)} is not three numbers; give three finite numbers")
+    return given

@@ -1,0 +1,367 @@
+"""The T-matrix of a body: its far fields of every incidence and direction, cross sections and averages.
+
+    p = T a,   u_inc = sum a psi^(1),  u_s = sum p psi^(3)          vector waves of E for a conductor
+    S = 1 + 2T,  S*S = 1 where nothing is absorbed;  T_lm,l'm' = (-1)^(m+m') T_l'-m',l-m by reciprocity
+    scattering |p|^2/k^2, extinction (4 pi/k) Im f(d, d), their means over all d, and over both polarisations:
+    (s/k^2) sum |T|^2 and -(s/k^2) Re tr T,  s = 4 pi, or 2 pi of a conductor
+
+Sources: [W71]; [MTL02, sec. 5.2 to 5.4]; Derivations, F36.
+"""
+
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creeping._typing import ArrayLike, ComplexArray, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.field.arguments import UNRESOLVED, observers_of
+from creeping.field.far_result import FarField
+from creeping.field.tmatrix.lack import Lack
+from creeping.field.tmatrix.patterns import (
+    Averages,
+    Backward,
+    Pattern,
+    Sections,
+    backward_series,
+    received,
+    recentred,
+    sent,
+    turned,
+)
+from creeping.geometry.arguments import flag, real_array, whole_number
+from creeping.geometry.directions import angles_of, unit_directions
+from creeping.storage.memory import within_budget
+
+if TYPE_CHECKING:
+    import xarray
+
+METHOD = "t-matrix"
+ORTHOGONAL = 1e-9
+"""What a rotation may lack of being one."""
+PAIRS = 4096
+"""Pairs of directions that are summed together."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TMatrix:
+    """What a body scatters of every incident wave, as a matrix between spherical waves about a centre.
+
+    Waves and their numbers are those of `creeping.field.tmatrix.spherical_waves`, which treams and acoustotreams share.
+
+    Attributes
+    ----------
+    matrix : ((L + 1)^2,) * 2 or (2 L (L + 2),) * 2 complex
+        From incoming regular to outgoing waves; of a conductor electric and magnetic multipoles of E in turn.
+    wavenumber : float, 1/L
+    center : (3,), L
+    boundary : str
+    vector : bool
+        Whether of E (a conductor), else of a scalar field.
+    body : str
+        What it is of, in words.
+    extinction : float
+        What is left of plane waves inside the body, rms over all incidences, as a share; NaN where it is not known.
+    absorbing : bool
+        Whether the body absorbs: then it need not be unitary.
+    unit : str
+        Of lengths: "m" where the body knows it, else "L".
+
+    Raises
+    ------
+    InvalidInputError
+        If the matrix has a size that no order has, or values that are not finite.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> T = cr.t_matrix(sc.Sphere(), wavenumber=1.0, boundary="hard")
+    >>> T.backscatter([(0, 0, 1), (1, 0, 0)]).total.shape, bool(T.reciprocity < 1e-3)
+    ((2,), True)
+    >>> sections = T.cross_sections((0, 0, 1))
+    >>> bool(abs(sections.absorption[0] / sections.scattering[0]) < 1e-3)
+    True
+    """
+
+    matrix: ComplexArray
+    wavenumber: float
+    center: FloatArray
+    boundary: str
+    vector: bool = False
+    body: str = ""
+    extinction: float = float("nan")
+    absorbing: bool = False
+    unit: str = "L"
+
+    def __post_init__(self) -> None:
+        T, L = np.asarray(self.matrix), 0
+        if T.ndim == 2 and T.shape[0] == T.shape[1]:
+            L = self.order
+        if T.shape != (self._waves(L),) * 2 or L < (1 if self.vector else 0):
+            raise InvalidInputError(
+                f"a T-matrix has shape {T.shape}; "
+                + ("2 L (L + 2) vector waves" if self.vector else "(L + 1)^2 waves")
+                + " in and out of an order L are needed"
+            )
+        if not np.all(np.isfinite(T)):
+            raise InvalidInputError(f"{int(np.sum(~np.isfinite(T)))} values of a T-matrix are not finite")
+
+    def _waves(self, order: int) -> int:
+        return 2 * order * (order + 2) if self.vector else (order + 1) ** 2
+
+    @property
+    def order(self) -> int:
+        """Highest degree of the waves."""
+        n = len(self.matrix)
+        return int(np.sqrt(n / 2 + 1) - 0.5) if self.vector else int(np.sqrt(n) - 0.5)
+
+    def __repr__(self) -> str:
+        error = "" if self.absorbing else f", unitarity {self.unitarity:.1g}"
+        return (
+            f"TMatrix(order {self.order}, {len(self.matrix)} waves, k = {self.wavenumber:g}, {self.boundary})\n"
+            f"  {self.body or 'a body'}; reciprocity {self.reciprocity:.1g}{error}; error of f {self.error:.1g} "
+            f"{self.unit}"
+        )
+
+    # --- errors
+
+    @cached_property
+    def _lack(self) -> Lack:
+        return Lack(self.matrix, self.wavenumber, self.order, vector=self.vector, absorbing=self.absorbing)
+
+    @property
+    def reciprocity(self) -> float:
+        """What f(d, r) and f(-r, -d) differ by, as a share of f, rms over all pairs of directions."""
+        return self._lack.reciprocity
+
+    @property
+    def unitarity(self) -> float:
+        """Norm of S*S - 1 over that of S - 1; NaN of a body that absorbs."""
+        return self._lack.unitarity
+
+    @property
+    def error(self) -> float:
+        """Error of f, L, rms over all pairs of directions, that 95 of 100 keep to; `bistatic` has it by direction."""
+        return self._lack.error
+
+    # --- far fields
+
+    def bistatic(self, directions: ArrayLike, observation: ArrayLike, *, pairs: bool = False) -> Pattern:
+        """Far fields f(d, r) of all incidences in all directions, or of pairs.
+
+        Parameters
+        ----------
+        directions : (3,) or (m, 3)
+            Of incidence; need not be unit.
+        observation : (3,) or (n, 3)
+            From the body to the observers.
+        pairs : bool
+            Whether one direction belongs to one incidence, m = n.
+
+        Returns
+        -------
+        Pattern
+            (m, n), or (m,) of pairs; of a conductor (m, n, 2, 2): theta and phi scattered, theta and phi incident.
+
+        Raises
+        ------
+        InvalidInputError
+            On bad directions, if numbers of pairs differ, and if the result takes more memory than it may.
+        """
+        flag(pairs, "pairs")
+        d = unit_directions(directions, "directions of incidence").reshape(-1, 3)
+        r = observers_of(observation)
+        c = 2 if self.vector else 1
+        if pairs and len(d) != len(r):
+            raise InvalidInputError(f"{len(d)} incidences and {len(r)} directions are no pairs")
+        if not pairs:
+            within_budget(80.0 * c * c * len(d) * len(r), f"{len(d)} x {len(r)} far fields", "ask for fewer at a time")
+        shape = (len(d), c, c) if pairs else (len(d), len(r), c, c)
+        found, lack = np.empty(shape, dtype=complex), np.empty(shape)
+        for first in range(0, len(d), PAIRS):
+            at = slice(first, first + PAIRS)
+            a = self._received(d[at]).reshape(-1, len(self.matrix)).T
+            came, lacks = self.matrix @ a, self._lack.of @ a
+            if pairs:
+                out = self._sent(r[at])
+                lanes = (lane.reshape(len(lane), -1, c) for lane in (came, lacks))
+                own = [
+                    np.stack([np.sum(out * one.T[:, None], axis=2) for one in np.moveaxis(lane, 2, 0)], axis=2)
+                    for lane in lanes
+                ]
+                found[at], lack[at] = own[0], np.abs(own[1])
+                continue
+            for start in range(0, len(r), PAIRS):
+                part = slice(start, start + PAIRS)
+                out = self._sent(r[part])
+                rows = out.reshape(-1, len(self.matrix))
+                each = [np.moveaxis((rows @ lane).reshape(len(out), c, -1, c), 2, 0) for lane in (came, lacks)]
+                found[at, part], lack[at, part] = each[0], np.abs(each[1])
+        error = self._lack.error_of(lack, d, r, pairs=pairs)
+        return Pattern(*((found, error) if self.vector else (found[..., 0, 0], error[..., 0, 0])))
+
+    def far_field(self, direction: ArrayLike, observation: ArrayLike) -> FarField:
+        """Far field of one incidence (3,) in directions (..., 3), with its error: as of `creeping.far_field`.
+
+        Raises
+        ------
+        InvalidInputError
+            On bad directions, and for several incidences.
+        """
+        d = unit_directions(direction, "direction of incidence").reshape(-1, 3)
+        if len(d) != 1:
+            raise InvalidInputError(f"far_field is of one incidence, not {len(d)}; bistatic is of many")
+        r = observers_of(observation)
+        found = self.bistatic(d, r)
+        return self._far(r, found.values[0], found.error[0])
+
+    def backscatter(self, directions: ArrayLike) -> FarField:
+        """Far field of each incidence (m, 3) back to where it comes from, in directions -d.
+
+        It is a Fourier series in both angles: of very many directions each costs little.
+        """
+        d = unit_directions(directions, "directions of incidence").reshape(-1, 3)
+        theta, phi = angles_of(d)
+        found = self._backward.at(theta, phi)
+        if self.vector:
+            # at the poles phi is 0 both of d and of -d, by convention: theta and phi of -d turn about
+            found[np.hypot(d[:, 0], d[:, 1]) < 1e-12] *= -1
+        found = found * np.exp(2j * self.wavenumber * (d @ self.center))[:, None, None]
+        error = self._lack.backward_error(d)
+        error = np.broadcast_to(error[:, None, None], found.shape).copy()
+        return self._far(-d, *((found, error) if self.vector else (found[:, 0, 0], error[:, 0, 0])))
+
+    @cached_property
+    def _backward(self) -> Backward:
+        return Backward(self.matrix, self.wavenumber, self.order, vector=self.vector)
+
+    def _far(self, r: FloatArray, total: ComplexArray, error: FloatArray) -> FarField:
+        off = ~(error < UNRESOLVED * np.max(np.abs(total), initial=self._lack.mean))
+        return FarField(
+            directions=np.array(r),
+            total=total,
+            parts={},
+            method=np.full(len(r), METHOD),
+            unresolved=off.any(axis=tuple(range(1, off.ndim))),
+            error=error,
+            error_by="reciprocity and unitarity",
+            wavenumber=self.wavenumber,
+            boundary=self.boundary,
+            order=2,
+            unit=self.unit,
+        )
+
+    def _received(self, d: FloatArray) -> ComplexArray:
+        """Regular waves in plane ones along d (m, 3): (m, c, waves)."""
+        phase = np.exp(1j * self.wavenumber * (d @ self.center))[:, None, None]
+        return np.asarray(phase * received(d, self.order, vector=self.vector))
+
+    def _sent(self, r: FloatArray) -> ComplexArray:
+        """Far fields of outgoing waves along r (n, 3): (n, c, waves)."""
+        phase = np.exp(-1j * self.wavenumber * (r @ self.center))[:, None, None]
+        return np.asarray(phase * sent(r, self.order, self.wavenumber, vector=self.vector))
+
+    # --- cross sections
+
+    def cross_sections(self, directions: ArrayLike) -> Sections:
+        """Scattering, extinction and absorption cross sections, L^2, of incidences (m, 3), which need not be unit."""
+        d = unit_directions(directions, "directions of incidence").reshape(-1, 3)
+        scattering, extinction = [], []
+        for first in range(0, len(d), PAIRS):
+            some = d[first : first + PAIRS]
+            a = self._received(some)
+            p = (a.reshape(-1, len(self.matrix)) @ self.matrix.T).reshape(a.shape)
+            scattering.append(np.sum(np.abs(p) ** 2, axis=2) / self.wavenumber**2)
+            forward = np.einsum("ncw,ncw->nc", self._sent(some), p)
+            extinction.append(4 * np.pi / self.wavenumber * forward.imag)
+        both = [np.concatenate(part) if part else np.zeros((0, 1)) for part in (scattering, extinction)]
+        return Sections(*(part if self.vector else part[:, 0] for part in both))
+
+    def orientation_average(self) -> Averages:
+        """Means over all orientations of the body: of backscattering, scattering and extinction."""
+        T, k, L = self.matrix, self.wavenumber, self.order
+        share = (2 if self.vector else 4) * np.pi / k**2
+        # |f|^2 is of degree 4L: Gauss's rule over cos theta, Parseval's sum over phi
+        u, w = np.polynomial.legendre.leggauss(2 * L + 1)
+        series = backward_series(T, k, np.arccos(u), L, vector=self.vector)
+        mean = 0.5 * float(np.sum(w * np.sum(np.abs(series) ** 2, axis=(1, 2, 3)))) / len(series[0])
+        return Averages(4 * np.pi * mean, share * float(np.linalg.norm(T)) ** 2, -share * float(np.trace(T).real))
+
+    # --- other places
+
+    def rotate(self, rotation: ArrayLike) -> TMatrix:
+        """That of the body turned about the origin by a rotation (3, 3), which takes its points x, L, to R x.
+
+        Raises
+        ------
+        InvalidInputError
+            If it is no rotation.
+        """
+        R = real_array(rotation, "rotation")
+        if R.shape != (3, 3) or np.max(np.abs(R @ R.T - np.eye(3))) > ORTHOGONAL or np.linalg.det(R) < 0:
+            raise InvalidInputError("rotation is no rotation: give a matrix (3, 3) with R R^T = 1 and determinant 1")
+        T = turned(self.matrix, R, self.order, vector=self.vector)
+        return replace(self, matrix=T, center=R @ self.center, body=self._moved("turned"))
+
+    def translate(self, shift: ArrayLike) -> TMatrix:
+        """That of the body moved by a vector (3,), L: its centre moves along.
+
+        Raises
+        ------
+        InvalidInputError
+            If the vector is not three numbers.
+        """
+        v = real_array(shift, "shift")
+        if v.shape != (3,):
+            raise InvalidInputError(f"shift has shape {v.shape}; give three numbers")
+        return replace(self, center=self.center + v, body=self._moved("moved"))
+
+    def about(self, center: ArrayLike, order: int | None = None) -> TMatrix:
+        """That of the same body by waves about another centre (3,), L.
+
+        Unless given, the order is that of a body of which the new centre is farther away.
+
+        Raises
+        ------
+        InvalidInputError
+            If the centre is not three numbers, the order no whole number, or the matrix too large.
+        """
+        c = real_array(center, "center")
+        if c.shape != (3,):
+            raise InvalidInputError(f"center has shape {c.shape}; give three numbers")
+        shift = c - self.center
+        larger = self.order + int(np.ceil(self.wavenumber * np.linalg.norm(shift)))
+        larger = larger if order is None else whole_number(order, "order")
+        within_budget(48.0 * self._waves(larger) ** 2, f"waves of order {larger}", "give a lower order=")
+        T = recentred(self.matrix, self.wavenumber, shift, self.order, larger, vector=self.vector)
+        return replace(self, matrix=T, center=c)
+
+    def _moved(self, how: str) -> str:
+        return self.body if not self.body or self.body.endswith(how) else f"{self.body}, {how}"
+
+    # --- other shapes
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The matrix with names on its axes: degree and order of each wave, of a conductor its polarisation too."""
+        from creeping.field.tmatrix.stored import as_dataset
+
+        return as_dataset(self)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write it as an HDF5 file that treams reads: see `creeping.field.tmatrix.stored`."""
+        from creeping.field.tmatrix.stored import write_t_matrix
+
+        write_t_matrix(self, path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> TMatrix:
+        """Read what `save` or treams has written."""
+        from creeping.field.tmatrix.stored import read_t_matrix
+
+        return cls(**read_t_matrix(path))

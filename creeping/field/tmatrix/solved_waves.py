@@ -1,0 +1,206 @@
+"""The equation of a body solved for the regular waves about a centre, and the outgoing waves of the solutions.
+
+Right sides are waves at the nodes and at the points beneath them, sums that are even or odd in the planes in which the
+nodes are mirrored (`creeping.field.tmatrix.mirrors`): one block of the matrix for each parity. Blocks are factorised in
+single precision. Waves of high degrees are tiny far inside the body's sphere; each is solved as a share of its rms.
+
+What is left of a wave inside the body is its error. Plane waves from everywhere have 4 pi sum |.|^2 of it in the mean.
+
+Sources: [W71]; [MTL02, sec. 5.8]; Derivations, F36.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from creeping._typing import Any, ComplexArray, FloatArray
+from creeping.field.equation.columns import solved_columns
+from creeping.field.equation.matrix import BLOCK, Matrix, Places
+from creeping.field.tmatrix.mirrors import Mirrors, parities
+from creeping.field.tmatrix.spherical_waves import combined, count, gradients, regular, vector_parts
+
+COLUMNS = 512
+"""Right sides that are solved together: between them an interrupt is heard."""
+TINY = 1e-18
+"""Share of a wave's rms below which it is 0: products of such numbers are slow, and nothing."""
+
+
+class WavesAt(NamedTuple):
+    """Regular waves at p places: right sides of the equation there, and what outgoing waves are integrals with.
+
+    Both are (c p, waves).
+    """
+
+    right: ComplexArray
+    sent: ComplexArray
+
+
+class SolvedWaves:
+    """The waves of an equation about a centre, in its parities.
+
+    Attributes
+    ----------
+    T : (waves, waves)
+        The T-matrix.
+    extinction : callable
+        Of points inside.
+    """
+
+    def __init__(
+        self,
+        matrix: Matrix,
+        center: FloatArray,
+        order: int,
+        mirrors: Mirrors,
+        tell: Callable[[str], None],
+        *,
+        direct: bool,
+    ) -> None:
+        self._of, self._center, self._order, self._mirrors = matrix, center, order, mirrors
+        self._sums, which = parities(order, self._mirrors.axes, vector=matrix.vector)
+        c, part, signs, images = matrix.columns, self._mirrors.part, self._mirrors.signs, self._mirrors.images
+        under = np.full(len(matrix.root), -1)
+        under[matrix.at] = np.arange(len(matrix.at))
+        # nodes of the part with points beneath them, and which these are
+        self._above, self._beneath = np.flatnonzero(under[part] >= 0), under[part][under[part] >= 0]
+        own, beneath = self._waves_at(matrix.nodes.part(part)), self._waves_at(matrix.inner.part(self._beneath))
+        own.sent[:] *= np.repeat(matrix.root[part] ** 2, c)[:, None]
+        (right, sent), (self._size, size) = zip(*(_scaled(lane) for lane in own), strict=True)
+        given = right, _cleared(beneath.right / self._size)
+        T = np.zeros((len(size), len(size)), dtype=complex)
+        self._values: Any = np.empty((c * len(matrix.root), len(size)), dtype=np.complex64)
+        rows = (c * images[:, :, None] + np.arange(c)).reshape(len(images), -1)
+        parts = [np.flatnonzero(which == number) for number in range(len(images))]
+        for number, found in enumerate(self._factorised(given, parts, tell) if direct else self._iterated(given, tell)):
+            at, chi = parts[number], self._mirrors.characters[number]
+            T[np.ix_(at, at)] = len(chi) * size[at][:, None] * (sent[:, at].T @ found) * self._size[at]
+            for image, sign in zip(rows, chi[:, None] * signs.reshape(len(chi), -1), strict=True):
+                self._values[np.ix_(image, at)] = found * sign[:, None].astype(np.float32)
+        self.T: ComplexArray = np.asarray(self._sums @ (self._sums @ T.T).T)
+
+    def _waves_at(self, places: Places) -> WavesAt:
+        matrix, k, x = self._of, self._of.k, places.points - self._center
+        table = regular(x, k, self._order + 1)
+        if matrix.vector:
+            parts = [part @ self._sums for part in vector_parts(self._order)]
+            both = np.stack([combined(table, parts, t) for t in (places.a, places.b)], axis=1)
+            # H of N is -i M, that of M is -i N; a.(n x H) = -b.H, b.(n x H) = a.H
+            H = -1j * both.reshape(len(x), 2, -1, 2)[..., ::-1].reshape(both.shape)
+            right = np.stack([-2 * H[:, 1], 2 * H[:, 0]], axis=1)
+            waves = both.shape[2]
+            return WavesAt(right.reshape(-1, waves), -(k**2) * both.conj().reshape(-1, waves))
+        values = (self._sums.T @ table[:, : count(self._order)].T).T
+        slope = k * combined(table, [part @ self._sums for part in gradients(self._order)], places.normals)
+        if matrix.soft:
+            return WavesAt(2 * slope, -1j * k * values.conj())
+        sent = slope.conj()
+        if matrix.boundary.kind == "impedance":
+            eta = np.broadcast_to(matrix.boundary.at(places.points).admittance, len(x))
+            sent += 1j * k * eta[:, None] * values.conj()
+        return WavesAt(2 * values, 1j * k * sent)
+
+    def _factorised(
+        self, given: tuple[np.ndarray, np.ndarray], parts: list[Any], tell: Callable[[str], None]
+    ) -> Iterator[np.ndarray]:
+        """Values at the nodes of the part (c m, waves) for the waves of each parity, by LAPACK."""
+        from scipy.linalg import lu_factor, lu_solve
+
+        matrix, c = self._of, self._of.columns
+        root = np.repeat(matrix.root[self._mirrors.part], c).astype(np.float32)[:, None]
+        B = given[0] * root
+        above = (c * self._above[:, None] + np.arange(c)).ravel()
+        B[above] -= 1j * given[1] * root[above]
+        blocks = self._blocks()
+        for number, at in enumerate(parts):
+            tell(f"factors of block {number + 1} of {len(parts)}")
+            # rows of C are columns of Fortran
+            factors = lu_factor(blocks[number].T, overwrite_a=True, check_finite=False)
+            found = np.asfortranarray(B[:, at])
+            for first in range(0, len(at), COLUMNS):
+                tell(f"wave {first + 1} of {len(at)}")
+                some = slice(first, first + COLUMNS)
+                found[:, some] = lu_solve(factors, found[:, some], trans=1, check_finite=False)
+            yield found / root
+
+    def _blocks(self) -> np.ndarray:
+        """Blocks of the matrix by parity, single precision."""
+        matrix, mirrors, c = self._of, self._mirrors, self._of.columns
+        images = mirrors.images
+        m = c * images.shape[1]
+        columns = (c * images[:, :, None] + np.arange(c)).reshape(len(images), -1)
+        signs = mirrors.signs.reshape(len(images), -1).astype(np.float32)
+        out = np.zeros((len(images), m, m), dtype=np.complex64)
+
+        def add(at: Any, rows: np.ndarray, factor: complex) -> None:
+            """Rows of the matrix, added up over images: sums and differences, one plane after the other."""
+            each: Any = np.stack([rows[:, order] * sign for order, sign in zip(columns, signs, strict=True)])
+            each *= factor
+            planes = each.reshape(*(2,) * len(mirrors.axes), *each.shape[1:])
+            for axis in range(len(mirrors.axes)):
+                even, odd = np.moveaxis(planes, axis, 0)
+                even += odd
+                # even is now e + o: e - o = (e + o) - 2 o
+                odd *= -2
+                odd += even
+            out[:, at] += each
+
+        own = matrix.nodes.part(mirrors.part)
+        for first in range(0, len(mirrors.part), BLOCK):
+            at = slice(first, first + BLOCK)
+            rows = matrix.rows(own.part(at), matrix.root[mirrors.part[at]])
+            add(slice(c * first, c * (first + BLOCK)), rows, 1.0 if matrix.soft else -1.0)
+        for block in out:
+            if matrix.soft:
+                block[:] = block.T.copy()
+            block[np.diag_indices(m)] += 1.0
+        for first in range(0, len(self._above), BLOCK):
+            above, beneath = (lane[first : first + BLOCK] for lane in (self._above, self._beneath))
+            under, root = matrix.inner.part(beneath), matrix.root[mirrors.part[above]]
+            rows = matrix.rows(under, root, "slope" if matrix.soft else "double")
+            add((c * above[:, None] + np.arange(c)).ravel(), rows, -1j if matrix.soft else 1j)
+        return out
+
+    def _iterated(self, given: tuple[np.ndarray, np.ndarray], tell: Callable[[str], None]) -> Iterator[np.ndarray]:
+        """Values at all nodes (c n, waves) by GMRES."""
+        matrix, c = self._of, self._of.columns
+        right, under = (part.reshape(-1, c, part.shape[1]) for part in given)
+        found = solved_columns(matrix, right, under, tell)
+        yield found.values.reshape(c * len(right), -1).astype(np.complex64)
+
+    def extinction(self, points: FloatArray) -> float:
+        """What is left of plane waves at points inside (m, 3), L, rms over all incidences; NaN without points."""
+        if not len(points):
+            return float("nan")
+        matrix, k = self._of, self._of.k
+        table = regular(points - self._center, k, self._order + 1)
+        x, z = (np.broadcast_to(row, points.shape) for row in np.eye(3)[[0, 2]])
+        if not matrix.vector:
+            kind, factor = ("single", -0.5) if matrix.soft else ("double", 0.5)
+            left = factor * matrix.received(Places.at(points, z), np.asarray(self._values), kind) * self._size
+            left += (self._sums.T @ table[:, : count(self._order)].T).T
+            return float(np.sqrt(4 * np.pi * np.sum(np.abs(left) ** 2) / len(points)))
+        # (n x H) x n has no part along n: another n for that one
+        H = np.empty((len(points), 3, self._values.shape[1]), dtype=complex)
+        both: Any = self._values.reshape(len(matrix.root), 2, -1)
+        for normals, axes in ((z, [0, 1]), (x, [2])):
+            places = Places.at(points, normals)
+            found = 0.5 * matrix.received(places, both)
+            turned = places.a[:, :, None] * found[:, :1] + places.b[:, :, None] * found[:, 1:]
+            H[:, axes] = np.cross(turned, normals[:, :, None], axis=1)[:, axes]
+        H *= self._size
+        E = np.stack([(part.T @ table.T).T for part in (p @ self._sums for p in vector_parts(self._order))], axis=1)
+        H += -1j * E.reshape(len(points), 3, -1, 2)[..., ::-1].reshape(E.shape)
+        return float(np.sqrt(2 * np.pi * np.sum(np.abs(H) ** 2) / len(points)))
+
+
+def _scaled(lane: ComplexArray) -> tuple[np.ndarray, FloatArray]:
+    """Columns over their rms, single precision, and that."""
+    size = np.sqrt(np.mean(np.abs(lane) ** 2, axis=0))
+    size[size == 0] = 1.0
+    return _cleared(lane / size), size
+
+
+def _cleared(lane: ComplexArray) -> np.ndarray:
+    lane[np.abs(lane) < TINY] = 0.0
+    return np.asarray(lane.astype(np.complex64))
