@@ -414,6 +414,8 @@ def readable(summary: dict[str, Any], output: Path) -> str:
     count, values = summary["by_currents"], summary["values"]
     rest = "" if count == values else f", the others by {others}"
     served = f"{count} of {values} values by currents{rest}"
+    if summary["otherwise_by"] == "t-matrix":
+        served = "all values by the T-matrix of the body"
     rows.append(f"{served}; {summary['unresolved']} unresolved")
     least, largest = summary["validity"]["least_k_rho"], summary["validity"]["largest_transverse"]
     if least is not None and largest is not None:

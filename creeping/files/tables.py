@@ -378,7 +378,10 @@ def write_echo(path: str | os.PathLike[str], echo: "Echo") -> None:
             row += [low[at], high[at], phase[at], total[at].real, total[at].imag, echo.error[at]]
             for part in echo.parts.values():
                 row += [part[at].real, part[at].imag]
-            row += [echo.unresolved[at].astype(int), "currents" if echo.by_currents[at] else echo.otherwise]
+            row += [
+                echo.unresolved[at].astype(int),
+                "currents" if echo.by_currents[at] and echo.otherwise != "t-matrix" else echo.otherwise,
+            ]
             stream.write(",".join(map(_text, row)) + "\n")
 
 

@@ -17,6 +17,7 @@ from creeping.field.arguments import checked, checked_method, checked_plain
 from creeping.field.body_currents import expected_seconds
 from creeping.field.boundary import BoundaryLike
 from creeping.field.echo import Echo
+from creeping.field.tmatrix.computing import pays
 from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geometry.arguments import checked_body, real_array, real_number, shown, whole_number
 from creeping.geometry.directions import azimuth_elevation_of, directions_from_azimuth_elevation
@@ -27,7 +28,7 @@ from creeping.phaseflow.tuning.flow_choice import choose_flow
 from creeping.rays.fan import launch
 from creeping.rays.reach import body_length
 from creeping.shadow.line import shadow_line
-from creeping.sweeping.request import AMPLITUDES
+from creeping.sweeping.request import AMPLITUDES, METHODS
 from creeping.sweeping.results import SweepFields
 from creeping.sweeping.run import Progress, sweep_directions
 
@@ -62,9 +63,10 @@ def backscatter(
     azimuth, elevation : float or (n,), degrees
         Where the radar is, as seen from the body; one may be a number.
     boundary : "pec", "soft", "hard" or ImpedanceBoundary
-    method : {"auto", "rays", "currents", "equation"}
+    method : {"auto", "rays", "currents", "equation", "t-matrix"}
         As of `creeping.sweep_directions`: "auto" takes currents where rays leave a value unresolved and err more, and
-        the integral equation of a body with edges, joints or tips.
+        the integral equation of a body with edges, joints or tips, or its T-matrix where that is quicker for so many
+        angles.
     n_rays : int
         Rays of an incidence.
     cache : bool
@@ -201,7 +203,7 @@ def _swept(
     if not why_no_rays(body):
         checked_body(body, charts=not is_piecewise(body))
     checked_plain(body)
-    checked_method(asked["method"], 2)
+    checked_method(asked["method"], 2, METHODS)
     asked["n_rays"] = whole_number(asked["n_rays"], "n_rays")
     numbers = np.atleast_1d(np.asarray(wavenumbers))
     k = np.array([checked(value, 2) for value in numbers.tolist()])
@@ -212,7 +214,13 @@ def _swept(
     count = len(incidences) * len(k) * len(asked.get("observation", (None,)))
     if count > MOST:
         raise InvalidInputError(f"{count} values are asked for at once; {MOST} are the most: give a coarser step")
-    if why_no_rays(body):
+    if asked["method"] == "auto" and (why_no_rays(body) or is_piecewise(body)):
+        # where the equation would be solved for each incidence
+        several = asked["quantity"] == "monostatic" and all(
+            pays(body, number, asked["boundary"], len(incidences)) for number in k
+        )
+        asked["method"] = "t-matrix" if several else "auto"
+    if why_no_rays(body) or asked["method"] == "t-matrix":
         return sweep_directions(body, incidences, wavenumbers=k, progress=progress, **asked)
     length = body_length(body, float(k.min()))
     flow = choose_flow(body, n_rays=2 * asked["n_rays"] * len(incidences), length=length, cache=cache)

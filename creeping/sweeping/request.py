@@ -24,7 +24,7 @@ from creeping.sweeping.lattice import Lattice, lattice_of
 
 Quantity = Literal["rays", "monostatic", "bistatic"]
 QUANTITIES: tuple[Quantity, ...] = ("rays", "monostatic", "bistatic")
-METHODS = ("rays", "auto", "currents", "equation")
+METHODS = ("rays", "auto", "currents", "equation", "t-matrix")
 LARGEST_LENGTH = 1e300
 LONG_LEAP = 0.15
 """Share of an automatic length up to which it is made one of whole leaps."""
@@ -109,9 +109,9 @@ class SweepRequest:
         Unit directions of "bistatic".
     order : 2 or 1
         Of the creeping waves.
-    method : {"rays", "auto", "currents", "equation"}
-        Of the fields: isolated rays, currents of the whole body where rays do not resolve an incidence, or for all, or
-        the body's integral equation for all.
+    method : {"rays", "auto", "currents", "equation", "t-matrix"}
+        Of the fields: isolated rays, currents of the whole body where rays do not resolve an incidence, or for all,
+        the body's integral equation for all, or its T-matrix.
     accuracy : float, optional
         Of fields: error allowed to interpolation between incidences; without it each is computed.
     lattice : Lattice, optional
@@ -152,7 +152,7 @@ class SweepRequest:
             number = isinstance(self.accuracy, float) and 0 < self.accuracy < 1
             if not number:
                 yield f"accuracy = {self.accuracy!r} is not a number between 0 and 1"
-            elif self.method in ("currents", "equation"):
+            elif self.method in ("currents", "equation", "t-matrix"):
                 yield f'accuracy goes with rays; method "{self.method}" computes every incidence'
         if self.quantity == "rays":
             if self.accuracy is not None:

@@ -129,7 +129,9 @@ def sweep_attributes(plan: SweepPlan, unit: str) -> dict[str, Any]:
     }
     if request.quantity != "rays":
         words |= {"boundaries": ", ".join(request.boundaries), "order_of_creeping_waves": int(request.order)}
-        if is_piecewise(plan.body):
+        if request.method == "t-matrix":
+            words["served_by"] = request.method
+        elif is_piecewise(plan.body):
             words["served_by"] = SERVED
     for name, value in flow.items():
         if name != "error" and value is not None:

@@ -31,6 +31,7 @@ from creeping.sweeping.solved_fields import NoFlow, SolvedSweeper
 from creeping.sweeping.storage.layout import UNDONE
 from creeping.sweeping.storage.store import SweepStore, mended
 from creeping.sweeping.sweeper import Passed, Sweeper
+from creeping.sweeping.t_matrix_fields import TMatrixSweeper
 
 if TYPE_CHECKING:
     import xarray
@@ -91,11 +92,12 @@ def sweep_directions(
         Points kept of each ray of "rays".
     order : 2 or 1
         Of the creeping waves.
-    method : {"rays", "auto", "currents", "equation"}
+    method : {"rays", "auto", "currents", "equation", "t-matrix"}
         Of the fields, "rays" if not given. "auto" computes an incidence again by the currents of the whole body where
         isolated rays leave a direction unresolved, a tenth of a second or so for each boundary and wavenumber,
         "currents" every one that a mesh of the body resolves: ``by_currents`` says which. "equation" solves the body's
         integral equation for every one, in seconds to minutes each (`creeping.surface_currents` with ``solve=True``).
+        "t-matrix" makes one matrix for each boundary and wavenumber (`creeping.t_matrix`), which has all incidences.
     accuracy : float, optional
         Interpolate fields between incidences, where they are dense and that is known to err by less than this share of
         the field's size, ten times it of the creeping part's own; 1e-3 is a good one. Each incidence that cannot be had
@@ -137,6 +139,8 @@ def sweep_directions(
         if quantity == "rays":
             raise InvalidInputError(rays_refused(flow))
         flow, method = NoFlow(flow), method or "auto"
+    elif method == "t-matrix":
+        flow = NoFlow(getattr(flow, "body", flow))
     flow = cast(Flow, flow)
     if not isinstance(flow, NoFlow):
         checked_flow(flow)
@@ -201,7 +205,7 @@ def in_memory(plan: SweepPlan, progress: Progress | None = None, order: IntArray
     order = np.arange(count) if order is None else order
     for task in range(plan.tasks):
         rows = plan.rows(task)
-        if progress and isinstance(sweeper, Sweeper | SolvedSweeper):
+        if progress and isinstance(sweeper, Sweeper | SolvedSweeper | TMatrixSweeper):
             sweeper.passed = _within(rows, count, started, progress)
         found, failed = compute(sweeper, plan.incidences[rows])
         for name, values in arrays.items():

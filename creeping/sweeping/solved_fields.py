@@ -192,7 +192,7 @@ class FieldArrays:
         """Arrays of a far field whose rows are the observers of one incidence after the other."""
         arrays = {name: getattr(field, name) for name in BY_OBSERVER}
         arrays = {name: np.array(v).reshape(incidences, -1, *v.shape[1:]) for name, v in arrays.items()}
-        by_currents = np.isin(field.method, ("currents", "equation")).reshape(arrays["unresolved"].shape)
+        by_currents = np.isin(field.method, ("currents", "equation", "t-matrix")).reshape(arrays["unresolved"].shape)
         return cls(arrays | {"by_currents": by_currents})
 
     @property

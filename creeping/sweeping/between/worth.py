@@ -27,6 +27,7 @@ from creeping.sweeping.lattice import Lattice
 from creeping.sweeping.request import SweepRequest, with_lattice
 from creeping.sweeping.solved_fields import NoFlow, SolvedSweeper
 from creeping.sweeping.sweeper import Sweeper
+from creeping.sweeping.t_matrix_fields import TMatrixSweeper
 
 FEWEST, MOST, SHARE = 2, 12, 2000
 """Cells that are tried: at least, at most, and incidences for each."""
@@ -44,7 +45,7 @@ def with_paying_lattice(flow: Flow, request: SweepRequest, incidences: FloatArra
     if lattice is None or lattice.dimensions == 1:
         return request
     sweeper = sweeper_of(flow, request)
-    if isinstance(sweeper, Sweeper | SolvedSweeper):
+    if isinstance(sweeper, Sweeper | SolvedSweeper | TMatrixSweeper):
         return request
     some = representatives(lattice, incidences)
     left = np.ones((len(some), lattice.levels))
@@ -83,8 +84,10 @@ def first_level(lattice: Lattice, left: FloatArray) -> int | None:
     return int(np.argmin(costs)) if min(costs) < PAYS else None
 
 
-def sweeper_of(flow: Flow, request: SweepRequest) -> Sweeper | FieldsBetween | SolvedSweeper:
+def sweeper_of(flow: Flow, request: SweepRequest) -> Sweeper | FieldsBetween | SolvedSweeper | TMatrixSweeper:
     """What gives the results of unit directions (n, 3); bodies with creases have no rays that all go on."""
+    if request.method == "t-matrix":
+        return TMatrixSweeper(flow, request)
     if isinstance(flow, NoFlow):
         return SolvedSweeper(flow, request)
     if request.lattice is None or is_piecewise(flow.body):
