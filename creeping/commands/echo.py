@@ -41,9 +41,9 @@ Incidence = Annotated[
 Method = Annotated[
     str,
     Parameter(
-        help="auto, rays, currents, equation or t-matrix: auto takes currents where rays do not resolve a value and err "
-        "more; equation solves the body's integral equation for every value, in seconds to minutes each; t-matrix makes "
-        "one matrix a frequency for all angles."
+        help="auto, rays, currents, equation or t-matrix: auto takes currents where rays do not resolve a value and "
+        "err more; equation solves the body's integral equation for every value, in seconds to minutes each; t-matrix "
+        "makes one matrix a frequency for all angles."
     ),
 ]
 Compare = Annotated[
