@@ -51,7 +51,7 @@ def by_name(path):
 
 def test_there_are_the_pages():
     expected = "accuracy benchmarks conventions derivations_bodies derivations_field derivations_rays echoes index"
-    more = "limitations notation notebooks own_body performance sweeps theory"
+    more = "limitations notebooks own_body performance sweeps theory"
     assert [page.stem for page in PAGES] == [*expected.split(), *more.split()]
 
 
