@@ -1,8 +1,6 @@
 """The BODY of a command: a name with parameters, a file, or an expression. Part of the command line.
 
 Also here: kinds of tables that a command writes, ``--format``, and the writing of them.
-
-Also here: the wave of a command: its wavenumber, or the frequency or wavelength it comes from.
 """
 
 import inspect
@@ -11,16 +9,11 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from creeping._typing import Any
-from creeping.errors import CreepingError, InvalidInputError
-from creeping.field.arguments import checked
-from creeping.field.frequency import frequency as hertz_of
-from creeping.field.frequency import suited
-from creeping.field.frequency import wavenumber as wavenumber_of
+from creeping.errors import InvalidInputError
 
 BODIES = {
     "sphere": "Sphere",
@@ -239,48 +232,3 @@ def write_tables(
     for kind in formats:
         writers[kind](stem.with_suffix(f".{kind}"))
     return [f"{stem.name}.{kind}" for kind in formats]
-
-
-def frequency_words(hertz: float) -> str:
-    """Frequency with the unit that makes it readable.
-
-    Examples
-    --------
-    >>> frequency_words(1e10), frequency_words(38e3), frequency_words(0.5)
-    ('10 GHz', '38 kHz', '0.5 Hz')
-    """
-    scale, name = suited(hertz)
-    return f"{hertz / scale:.6g} {name}"
-
-
-def asked_wavenumber(
-    wavenumber: float | None, frequency: str | None, wavelength: str | None, sound_speed: float | None
-) -> tuple[float, float | None]:
-    """The one wavenumber that is asked for, and its frequency, Hz, if it was not given as a wavenumber.
-
-    Raises
-    ------
-    InvalidInputError
-        If not exactly one is given, or it is no number.
-    """
-    given: dict[str, Any] = {"--wavenumber": wavenumber, "--frequency": frequency, "--wavelength": wavelength}
-    given = {name: value for name, value in given.items() if value is not None}
-    if len(given) != 1:
-        raise InvalidInputError(f"{' and '.join(given) or 'no wave'} given; give one of --wavenumber, --frequency")
-    ((option, value),) = given.items()
-    if wavenumber is not None:
-        if sound_speed is not None:
-            raise InvalidInputError("--sound-speed goes with --frequency; --wavenumber needs none")
-        try:
-            return checked(wavenumber, 2), None
-        except CreepingError as error:
-            raise InvalidInputError(f"--{error}") from error
-    if wavelength is not None and not wavelength.strip().endswith("m"):
-        raise InvalidInputError(f"--wavelength {wavelength!r} has no unit; give e.g. 3cm")
-    try:
-        found = wavenumber_of(value, sound_speed=sound_speed)
-        if not isinstance(found, float):
-            raise InvalidInputError(f"{value!r} is a range; `creeping rcs` and `creeping ts` take those")
-        return checked(found, 2), float(hertz_of(found, sound_speed=sound_speed))
-    except InvalidInputError as error:
-        raise InvalidInputError(f"{option}: {error}") from error

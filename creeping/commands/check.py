@@ -44,7 +44,7 @@ def check(
     if wavenumber is not None and not 0 < wavenumber < float("inf"):
         raise InvalidInputError(f"--wavenumber {wavenumber!r} is not a positive finite number")
     if any(value is not None for value in (wavenumber, frequency, wavelength, sound_speed)):
-        from creeping.commands.body import asked_wavenumber
+        from creeping.commands.wave import asked_wavenumber
 
         wavenumber, _ = asked_wavenumber(wavenumber, frequency, wavelength, sound_speed)
     mesh = is_file(body) and Path(body).suffix.lower() not in CAD

@@ -10,7 +10,8 @@ import numpy as np
 
 from creeping import files, plotting
 from creeping._typing import ArrayLike, FloatArray
-from creeping.commands.body import asked_wavenumber, frequency_words, write_tables
+from creeping.commands.body import write_tables
+from creeping.commands.wave import asked_wavenumber, frequency_words
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.body_currents import cached_currents
 from creeping.field.boundary import BoundaryLike, parse_boundary

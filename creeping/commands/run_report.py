@@ -122,7 +122,7 @@ def write_results(
 
 def _wave(field: dict[str, Any]) -> str:
     """Wavenumber, and the frequency that was asked for."""
-    from creeping.commands.body import frequency_words
+    from creeping.commands.wave import frequency_words
 
     told = f"k = {field['wavenumber']:g}"
     return told if field["frequency"] is None else f"{frequency_words(field['frequency'])}, {told}"

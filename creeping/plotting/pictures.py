@@ -1,19 +1,9 @@
-"""Whole figures as PNG files: the body in space, by pyvista or matplotlib, and the parameter plane.
-
-Also here: figures outside pyplot that notebooks show: no window, no global state, and their axes answer as pictures.
-
-A notebook asks the last value of a cell for ``_repr_png_``, whichever backend is on.
-"""
+"""Whole figures as PNG files: the body in space, by pyvista or matplotlib, and the parameter plane."""
 
 import os
 from collections.abc import Sequence
-from io import BytesIO
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from mpl_toolkits.mplot3d import Axes3D
 
 from creeping._typing import Any
 from creeping.errors import InvalidInputError
@@ -137,6 +127,8 @@ def drawn_page(drawing: Drawing, backend: str, dpi: int) -> tuple[Any, Place]:
 
 def new_figure(inches: tuple[float, float]) -> Any:
     """Return a figure outside pyplot: no window, no global state, whatever the user's backend; notebooks show it."""
+    from creeping.plotting._inline import made
+
     return made(inches)
 
 
@@ -144,6 +136,7 @@ def axes_or_new(ax: Any, inches: tuple[float, float], *, space: bool = False) ->
     """Whether the axes are new, and the axes: those given, or those of a new figure, of the plane or of space."""
     if ax is not None:
         return False, ax
+    from creeping.plotting._inline import InlineAxes, InlineAxes3D
 
     figure = new_figure(inches)
     figure.set_layout_engine("constrained")
@@ -187,6 +180,7 @@ def _page(drawing: Drawing) -> tuple[Any, Place]:
 
 def _draw_matplotlib(figure: Any, place: Place, drawing: Drawing, dpi: int) -> None:
     from creeping.plotting import axes3d
+    from creeping.plotting._inline import InlineAxes3D
 
     axes3d.draw(figure.add_axes(place, axes_class=InlineAxes3D), drawing)
 
@@ -211,38 +205,3 @@ def _draw_pyvista(figure: Any, place: Place, drawing: Drawing, dpi: int) -> None
     for mark in drawing.marks:
         ax.fill(*drawing.view.project(mark.outline(drawing.view)).T, color=ARROW_COLOUR, linewidth=0)
         ax.text(*drawing.view.project(mark.label(drawing.view)), mark.name, **mark.text)
-
-
-class InlineFigure(Figure):
-    """A figure that shows itself."""
-
-    def _repr_png_(self) -> bytes:
-        """The figure as a PNG."""
-        with BytesIO() as stream:
-            self.savefig(stream, format="png", dpi=self.dpi)
-            return stream.getvalue()
-
-
-class _Inline:
-    """Axes that show the figure that they are in."""
-
-    figure: Any
-
-    def _repr_png_(self) -> bytes:
-        """The whole figure as a PNG."""
-        return bytes(self.figure._repr_png_())
-
-
-class InlineAxes(_Inline, Axes):
-    """Axes of the plane."""
-
-
-class InlineAxes3D(_Inline, Axes3D):  # type: ignore[misc, unused-ignore]
-    """Axes of space."""
-
-
-def made(inches: tuple[float, float]) -> InlineFigure:
-    """Return a white figure with a canvas of its own."""
-    figure = InlineFigure(figsize=inches, facecolor="white")
-    FigureCanvasAgg(figure)
-    return figure

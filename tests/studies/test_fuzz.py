@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from studies import fuzz
-from studies.fuzz import readers, seeds, supervision
+from studies.fuzz import child, readers, seeds, supervision
 from studies.fuzz.calls import ACCEPTED, CRASH, REFUSED, SILENT, SLOW, WRONG, Verdict, generator
 from studies.fuzz.mutation import mutated
 
@@ -24,7 +24,7 @@ def test_bad_input_is_refused_or_taken_as_it_is(name, tmp_path):
     attack.fitted = 0.0
     # of connections it is seen that the page's own messages do turn the incidence
     attack.prepare(tmp_path)
-    verdicts = [supervision.tried(attack, name, 5, number, tmp_path / f"case-{number}") for number in range(12)]
+    verdicts = [child.tried(attack, name, 5, number, tmp_path / f"case-{number}") for number in range(12)]
     assert [found for found in verdicts if found.kind not in GOOD] == []
     assert any(found.kind == REFUSED for found in verdicts)
     if name == "origin":
@@ -39,7 +39,7 @@ def test_bad_arguments_are_refused(tmp_path, monkeypatch):
     attack.prepare(tmp_path)
     assert len(attack.values) > 170 and len(attack) > 20_000
     chosen = range(0, len(attack), len(attack) // 100)
-    verdicts = [supervision.tried(attack, "call", 0, number, tmp_path / f"case-{number}") for number in chosen]
+    verdicts = [child.tried(attack, "call", 0, number, tmp_path / f"case-{number}") for number in chosen]
     assert [found for found in verdicts if found.kind not in GOOD] == []
 
 
