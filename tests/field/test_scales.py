@@ -39,7 +39,9 @@ def far(s, kind, method):
 
 
 @pytest.mark.parametrize("scale", SCALES)
-@pytest.mark.parametrize("kind", BOUNDARIES)
+@pytest.mark.parametrize(
+    "kind", [kind if kind != "pec" else pytest.param(kind, marks=pytest.mark.slow) for kind in BOUNDARIES]
+)
 @pytest.mark.parametrize("method, tolerance", [("currents", STORED), ("rays", TRACED)])
 def test_far_field(method, kind, tolerance, scale):
     one, other = far(1.0, kind, method), far(scale, kind, method)
@@ -82,7 +84,7 @@ def at_points(s, kind):
 
 @pytest.mark.parametrize("scale", SCALES)
 @pytest.mark.parametrize(
-    "kind", ["hard", "pec", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("soft", "impedance"))]
+    "kind", ["hard", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("soft", "impedance", "pec"))]
 )
 def test_fields_at_points(kind, scale):
     for (one, unit), (other, its_unit) in zip(at_points(1.0, kind), at_points(scale, kind), strict=True):

@@ -64,6 +64,7 @@ def test_triaxial(rng):
     assert np.median(stated / off) < 5
 
 
+@pytest.mark.slow
 def test_near_the_far_zone_and_inside(rng):
     k, r = 10.0, directions(rng, 5)
     currents = cr.surface_currents(fan_of(sc.Ellipsoid(1.0, 0.8, 0.6), OBLIQUE), wavenumber=k, boundary="pec")

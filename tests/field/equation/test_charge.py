@@ -50,6 +50,7 @@ def flat():
     return cr.launch(cr.DirectFlow(body, rtol=1e-6), line, length=1.0, n_rays=16)
 
 
+@pytest.mark.slow
 def test_next_to_faces_and_edges(flat):
     k, up, out = 4.0, np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
     x = np.array([[0.1, 0.2, 0.5 + 1e-4], [-0.3, 0.1, 0.5 + 1e-4], [0.5 + 1e-4, 0.0, 0.2]])

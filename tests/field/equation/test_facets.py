@@ -94,6 +94,7 @@ def test_rectangles_come_back():
     assert len(patches.places) == 6 and patches.edges.all()
 
 
+@pytest.mark.slow
 def test_size_and_unit_change_nothing():
     mesh, d = trimesh.creation.cone(0.5, 1.2, sections=9), (0.2, -0.7, 0.5)
     large = mesh.copy()

@@ -75,6 +75,7 @@ def test_far_field_of_a_fan_is_that_of_the_equation_where_edges_diffract(flat):
     assert set(by_rays.method) == {"rays+optics"}
 
 
+@pytest.mark.slow
 def test_a_sweep_solves_each_frequency_once_for_all_incidences(monkeypatch):
     asked, found, wavenumbers = [], [], np.array([1.0, 1.2])
     monkeypatch.setattr(solving, "KEPT", 1)
