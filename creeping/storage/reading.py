@@ -22,14 +22,24 @@ def opened(path: str | os.PathLike[str], most: float = math.inf) -> io.BufferedR
     ...
     OSError: [Errno 22] it is no regular file, but a folder, a pipe, a socket or a device
     """
-    if not stat.S_ISREG(os.stat(path).st_mode):
-        raise OSError(errno.EINVAL, "it is no regular file, but a folder, a pipe, a socket or a device")
-    # what stands there may have changed meanwhile
+    # before it is opened: to open a device may do something
+    _require_regular(os.stat(path))
     stream = open(path, "rb", opener=lambda name, flags: os.open(name, flags | getattr(os, "O_NONBLOCK", 0)))
-    if (size := os.fstat(stream.fileno()).st_size) > most:
+    try:
+        # what stands there may have changed meanwhile
+        found = os.fstat(stream.fileno())
+        _require_regular(found)
+        if found.st_size > most:
+            raise OSError(errno.EFBIG, f"it has {found.st_size / 1e6:.0f} MB, {most / 1e6:.0f} are the most")
+    except OSError:
         stream.close()
-        raise OSError(errno.EFBIG, f"it has {size / 1e6:.0f} MB, {most / 1e6:.0f} are the most")
+        raise
     return stream
+
+
+def _require_regular(found: os.stat_result) -> None:
+    if not stat.S_ISREG(found.st_mode):
+        raise OSError(errno.EINVAL, "it is no regular file, but a folder, a pipe, a socket or a device")
 
 
 def bytes_of(path: str | os.PathLike[str], most: int) -> bytes:

@@ -9,6 +9,7 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray
 from creeping.field.boundary import BoundaryLike, parse_boundary
+from creeping.field.equation.solving import POOR
 from creeping.field.tmatrix.computing import t_matrix
 from creeping.field.tmatrix.result import TMatrix
 from creeping.geometry.memo import memo
@@ -21,8 +22,6 @@ from creeping.sweeping.solved_fields import FieldArrays
 
 SHARE = 0.1
 """Part of the memory that the matrices of a body may take."""
-LEFT = 0.05
-"""What plane waves may leave inside, as a share, rms: of a matrix that leaves more nothing is resolved."""
 
 
 class TMatrixSweeper:
@@ -55,13 +54,14 @@ class TMatrixSweeper:
         for k, wavenumber in enumerate(request.wavenumbers):
             for name, which, suffix in request.problems:
                 T = kept_t_matrix(self.flow.body, wavenumber, parse_boundary(name))
-                each = [slice(row, row + 1) for row in range(len(d))] if bistatic else [slice(None)]
-                for rows in each:
-                    far = T.far_field(d[rows], np.array(request.observation)) if bistatic else T.backscatter(d[rows])
-                    for part, values in FieldArrays.of(far, len(d[rows])).arrays.items():
+                found = T.far_fields(d, np.array(request.observation)) if bistatic else [T.backscatter(d)]
+                for row, far in enumerate(found):
+                    rows: Any = slice(row, row + 1) if bistatic else slice(None)
+                    for part, values in FieldArrays.of(far, 1 if bistatic else len(d)).arrays.items():
                         if part + suffix in out:
                             out[part + suffix][(rows, *which, k)] = values if bistatic else values[:, 0]
-                if not T.extinction <= LEFT:
+                # as of currents that are solved one by one
+                if not T.extinction <= POOR:
                     every: Any = (slice(None), *which, k)
                     out["unresolved" + suffix][every] = True
                 done += 1

@@ -35,13 +35,14 @@ from creeping.field.conductor.marched import current_marches, marched_current
 from creeping.field.conductor.vector_waves import VectorWaves
 from creeping.field.currents.conductor import ConductorCurrents, lit_vectors, ray_scalars, ray_vectors
 from creeping.field.currents.nodes import TAKEN_OVER, axes_of_incidence, lit_part
-from creeping.field.equation.currents import ON_BODY, ConductorTileCurrents
+from creeping.field.equation.currents import ON_BODY, ConductorTileCurrents, along_body
 from creeping.field.far_geometry import fan_strips
 from creeping.field.lit_ground import composed, convex, lit_error
 from creeping.field.point_result import LEAST_WORTH, WORTH, FieldStatus, PointValues, Words, measured_field
 from creeping.field.ray_sums import RaySum, own_error, ray_sum, total_of
 from creeping.field.strip_waves import StripTable, modes_on_strip, resampled, without_tubes
 from creeping.field.surface import surface_waves
+from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.quadrature import nodes_at
 from creeping.geometry.surface import Surface, normal, project, size
 from creeping.rays.fan import RayFan
@@ -147,9 +148,13 @@ def on_conductor(
 def _solved_on(currents: ConductorTileCurrents, points: FloatArray, left: FloatArray) -> OnConductor:
     """J and the charge of solved currents at points (n, 3), L."""
     found = currents.on_body(points)
+    values = found.values
+    if not is_piecewise(currents.body):
+        # normals of tiles are not quite those of the body; on an edge each face has its own
+        values = along_body(normal(currents.body, points), values)
     served = []
     for i, share in enumerate(left):
-        J, error = found.values[:, :, i], np.maximum(found.error[:, i], ON_BODY * float(share))
+        J, error = values[:, :, i], np.maximum(found.error[:, i], ON_BODY * float(share))
         one, lit = measured_field(J, error, "equation", "extinction"), found.lit[:, None]
         served.append(replace(one, wave=np.where(lit, J, 0.0), creeping=np.where(lit, 0.0, J)))
     return OnConductor(served, *currents.charge_on_body(points))

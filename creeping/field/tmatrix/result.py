@@ -12,6 +12,7 @@ Sources: [W71]; [MTL02, sec. 5.2 to 5.4]; Derivations, F36.
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -36,7 +37,7 @@ from creeping.field.tmatrix.patterns import (
 )
 from creeping.geometry.arguments import flag, real_array, whole_number
 from creeping.geometry.directions import angles_of, unit_directions
-from creeping.storage.memory import within_budget
+from creeping.storage.memory import blocks, within_budget
 
 if TYPE_CHECKING:
     import xarray
@@ -46,6 +47,8 @@ ORTHOGONAL = 1e-9
 """What a rotation may lack of being one."""
 PAIRS = 4096
 """Pairs of directions that are summed together."""
+VALUE = 80.0
+"""Bytes that a far field with its error takes while it is made."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -181,7 +184,7 @@ class TMatrix:
         if pairs and len(d) != len(r):
             raise InvalidInputError(f"{len(d)} incidences and {len(r)} directions are no pairs")
         if not pairs:
-            within_budget(80.0 * c * c * len(d) * len(r), f"{len(d)} x {len(r)} far fields", "ask for fewer at a time")
+            within_budget(VALUE * c * c * len(d) * len(r), f"{len(d)} x {len(r)} far fields", "ask for fewer at a time")
         shape = (len(d), c, c) if pairs else (len(d), len(r), c, c)
         found, lack = np.empty(shape, dtype=complex), np.empty(shape)
         for first in range(0, len(d), PAIRS):
@@ -216,10 +219,24 @@ class TMatrix:
         """
         d = unit_directions(direction, "direction of incidence").reshape(-1, 3)
         if len(d) != 1:
-            raise InvalidInputError(f"far_field is of one incidence, not {len(d)}; bistatic is of many")
+            raise InvalidInputError(f"far_field is of one incidence, not {len(d)}; far_fields is of many")
+        return next(self.far_fields(d, observation))
+
+    def far_fields(self, directions: ArrayLike, observation: ArrayLike) -> Iterator[FarField]:
+        """Far field of each incidence (m, 3) in the directions (..., 3), one after the other.
+
+        Waves are made once for all of them, as far as the memory holds the fields together.
+
+        Raises
+        ------
+        InvalidInputError
+            On bad directions.
+        """
+        d = unit_directions(directions, "directions of incidence").reshape(-1, 3)
         r = observers_of(observation)
-        found = self.bistatic(d, r)
-        return self._far(r, found.values[0], found.error[0])
+        for part in blocks(len(d), VALUE * (4 if self.vector else 1) * max(len(r), 1)):
+            found = self.bistatic(d[part], r)
+            yield from (self._far(r, *each) for each in zip(found.values, found.error, strict=True))
 
     def backscatter(self, directions: ArrayLike) -> FarField:
         """Far field of each incidence (m, 3) back to where it comes from, in directions -d.
