@@ -48,6 +48,8 @@ def test_errors_of_near_and_surface_fields_are_covered_on_the_sphere(boundary):
     study = conductor_coverage if boundary == "pec" else near_coverage
     found = study.row("sphere", 10.0, *(() if boundary == "pec" else (boundary,)), 10)
     for part in study.PARTS:
+        if part == "close" and np.isnan(found[part]):
+            continue  # the equation, which knows its error next to the body, is the method there
         assert found[part] > 95, part
         # in the shadow what is next to the body, where errors are largest, counts as close
         assert found[f"{part} ratio"] < (8 if boundary == "pec" else 15 if part == "shadow" else 10), part

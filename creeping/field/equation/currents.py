@@ -50,13 +50,17 @@ THIN = (DEPTH, SHALLOW, 0.05, 0.02, 0.005)
 """Least depths, in wavelengths, of points inside, the next where the body is too thin for one."""
 DEEPEST = 50
 """Points inside a body that is thinner everywhere."""
-ON_BODY = 10.0
-"""Error of currents at a point and of the field next to the body by what they leave inside of the incident wave."""
+ON_BODY, OFF_BODY = 10.0, 2.0
+"""Error of currents at a point and of the field next to the body, and of that far from it, by what they leave inside of
+the incident wave."""
 LEAST, LEAST_NEAR = 2e-5, 5e-5
 """What is left inside, at least, for the far field, where errors of tiles cancel, and on the body and near it: a few
 times what is left of the equation and what integrals over tiles err by (`studies.edges`)."""
 UNRESOLVED = 2.0
 """Error by what tiles do not resolve, in what two ways to the same value differ by."""
+SMOOTHED = 0.04
+"""Share of what polynomials of tiles do not resolve that the equation leaves in currents away from edges; on six bodies
+0.01 to 0.03 (`tests.field.equation.test_solution`)."""
 LEVELS = {"hard": 1.1, "soft": 0.9, "impedance": 0.9, "conductor": 1.1}
 """Error of the far field over what is found of it, with which it holds in 95 of 100 directions (`studies.edges`)."""
 CLOSEST = 1e-6
@@ -165,8 +169,8 @@ class _OnTiles(SurfaceCurrents):
         """
         return self._at(self._places(points))
 
-    def _at(self, places: Places, *, edges: bool = True) -> OnBody:
-        """The current at places of tiles; whether its error knows that it grows at ``edges``."""
+    def _at(self, places: Places) -> OnBody:
+        """The current at places of tiles."""
         soft = self.boundary.kind == "soft"
         sums = self._received(places, self.values, "slope" if soft else "double")
         magnetic = self._incident[None] if self._incident.ndim else np.zeros((1, 3, 0))
@@ -174,7 +178,7 @@ class _OnTiles(SurfaceCurrents):
         values = _vectors(places, wave[:, :, 0]) if self._incident.ndim else wave[:, 0]
         lit = lit_ground(self.body, places.points, places.normals, self.direction)
         values = values - sums if soft else values + sums
-        error = self._unresolved(places, self.values, values, self.wavenumber if soft else 1.0, edges=edges)
+        error = self._error_on(places, self.values, values, self.wavenumber if soft else 1.0)
         return OnBody(values, error, places.points, places.normals, lit)
 
     def _places(self, points: ArrayLike) -> Places:
@@ -182,18 +186,27 @@ class _OnTiles(SurfaceCurrents):
         tile, u, v, _ = self.matrix.tiles.located(as_points(points).reshape(-1, 3))
         return _on_tiles(self.matrix.tiles, (tile, u, v))
 
-    def _unresolved(
-        self, places: Places, nodes: ComplexArray, values: ComplexArray, unit: float, *, edges: bool = True
-    ) -> FloatArray:
-        """Error of values (m, ...) at places by what the polynomials of those at the nodes differ from them by."""
-        apart, large = values - self._between(places, nodes), values
-        if values.ndim == 3:
-            apart, large = (np.linalg.norm(part, axis=1) for part in (apart, large))
-        error = np.hypot(ON_BODY * unit * np.maximum(self._left, LEAST_NEAR), UNRESOLVED * np.abs(apart))
-        if edges and self.boundary.kind in ("soft", "conductor"):
-            assert places.own is not None
-            grown = _at_edges(self.matrix.tiles.from_edge(*places.own))
-            error = np.hypot(error, (grown * np.abs(large).T).T)
+    def _unresolved(self, places: Places, nodes: ComplexArray, values: ComplexArray) -> FloatArray:
+        """Error of polynomials through the nodes, by what values at places differ from them by: (m,) or (m, p)."""
+        apart = values - self._between(places, nodes)
+        return UNRESOLVED * (np.linalg.norm(apart, axis=1) if apart.ndim == 3 else np.abs(apart))
+
+    def _error_on(self, places: Places, nodes: ComplexArray, values: ComplexArray, unit: float) -> FloatArray:
+        """Error of values that the equation gives at places (m, ...): (m,), of a conductor (m, p).
+
+        What polynomials do not resolve changes sign across a tile, so that on ground that curves little its integral is
+        small; across an edge it is not.
+        """
+        assert places.own is not None
+        tiles, (tile, u, v) = self.matrix.tiles, places.own
+        from_edge = tiles.from_edge(tile, u, v)
+        away = from_edge * gauss(tiles.p)[0][0] * tiles.widths[tile]
+        share = np.minimum(1.0, SMOOTHED + 1 / (1 + (away / tiles.reach[tile]) ** 2))
+        unresolved = (share * self._unresolved(places, nodes, values).T).T
+        error = np.hypot(ON_BODY * unit * np.maximum(self._left, LEAST), unresolved)
+        if self.boundary.kind in ("soft", "conductor"):
+            large = np.linalg.norm(values, axis=1) if values.ndim == 3 else np.abs(values)
+            error = np.hypot(error, (_at_edges(from_edge) * large.T).T)
         return np.asarray(error)
 
     def between_nodes(self, points: ArrayLike) -> ComplexArray:
@@ -253,14 +266,23 @@ class _OnTiles(SurfaceCurrents):
 
         What the polynomials of a tile do not resolve of currents changes sign 2p + 1 times or so across its width w:
         its field fades over w/(2p + 1), slower once it has, and of what du/dn lacks it is that times w/(2p + 1). On the
-        body potentials are halfway between the polynomials and what the equation gives.
+        body potentials are halfway between the polynomials and what the equation gives. What the integrals over tiles
+        err by is of many tiles: it fades as reach/distance, from ON_BODY of what is left inside to OFF_BODY, and that
+        as waves do.
         """
         tiles = self.matrix.tiles
         away, nearest = tiles.fine_tree.query(points)
         tile = nearest // tiles.finer**2
-        reach = np.sqrt(tiles.sizes[tile] * tiles.widths[tile]) / (2 * tiles.p + 1)
-        faded = 0.5 * (reach if self.boundary.kind == "soft" else 1.0) / (1 + (away / reach) ** 2)
-        return np.asarray(np.maximum((faded * self._unresolved_of_tiles[tile].T).T, ON_BODY * self._left_next_to))
+        reach = tiles.reach[tile]
+        of_tile = 0.5 * (reach if self.boundary.kind == "soft" else 1.0) / (1 + (away / reach) ** 2)
+        left = self._left_inside
+        near, off = ON_BODY / (1 + away / reach), OFF_BODY / (1 + away / size(self.body))
+        integrals = np.hypot(
+            np.multiply.outer(np.maximum(left, LEAST_NEAR), near), np.multiply.outer(np.maximum(left, LEAST), off)
+        )
+        error = np.maximum(of_tile * self._unresolved_of_tiles[tile].T, integrals).T
+        edges = LEVELS[self.boundary.kind] * self.matrix.edge_term.near(self.values, self.boundary.kind, points)
+        return np.asarray(np.hypot(error, edges[:, 0] if error.ndim == 1 else edges))
 
     @cached_property
     def _unresolved_of_tiles(self) -> FloatArray:
@@ -272,17 +294,17 @@ class _OnTiles(SurfaceCurrents):
         ]
         u, v = (np.tile(one.ravel(), tiles.count) for one in np.meshgrid(*ends))
         places = _on_tiles(tiles, (np.repeat(np.arange(tiles.count), 4), u, v))
-        found = self._error_at(places)
+        found = self._unresolved_at(places)
         return np.asarray(found.reshape(tiles.count, 4, *found.shape[1:]).max(axis=1))
 
-    def _error_at(self, places: Places) -> FloatArray:
-        """Error of what is on the body at places of tiles: u is bounded at edges, whatever the boundary."""
-        return self._at(places, edges=False).error
+    def _unresolved_at(self, places: Places) -> FloatArray:
+        """What the polynomials of tiles do not resolve at places of them."""
+        return self._unresolved(places, self.values, self._at(places).values)
 
     @property
-    def _left_next_to(self) -> FloatArray:
-        """What is left inside of the incident wave."""
-        return np.maximum(self._left, LEAST_NEAR)
+    def _left_inside(self) -> FloatArray:
+        """What is left inside of the incident wave, of a conductor of E and H (p,)."""
+        return np.asarray(self._left)
 
     def _next_to(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
         """Scattered field, of a conductor H, at points (m, 3) next to the body, of values at the nodes: (m, ...)."""
@@ -426,7 +448,10 @@ class ConductorTileCurrents(_OnTiles, ConductorCurrents):
         J, electric = self.values[:, :, None], self.incident_electric[None]
         given = twice_normal(matrix, places, J, d, electric)[:, 0]
         values = given - matrix.received(places, self.charge, "slope")
-        return values, self._unresolved(places, self.charge, values, 1.0)
+        assert places.own is not None
+        # the potential of what tiles do not resolve of J, which changes sign along the body
+        potential = (self.wavenumber * matrix.tiles.reach[places.own[0]] * super()._unresolved_at(places).T).T
+        return values, np.hypot(self._error_on(places, self.charge, values, 1.0), potential)
 
     def scattered_electric(self, points: ArrayLike) -> ComplexArray:
         """Scattered E at points (m, 3), L, at any distance from the body: (m, 3, p)."""
@@ -454,12 +479,13 @@ class ConductorTileCurrents(_OnTiles, ConductorCurrents):
         error[close] = np.hypot(error[close], grown[:, None] * largest[tile])
         return error
 
-    def _error_at(self, places: Places) -> FloatArray:
-        return np.maximum(self._at(places).error, self._charge_at(places)[1])
+    def _unresolved_at(self, places: Places) -> FloatArray:
+        of_charge = self._unresolved(places, self.charge, self._charge_at(places)[0])
+        return np.maximum(super()._unresolved_at(places), of_charge)
 
     @property
-    def _left_next_to(self) -> FloatArray:
-        return np.asarray(np.maximum(np.max(self.left_of_each, axis=0), LEAST_NEAR))
+    def _left_inside(self) -> FloatArray:
+        return np.asarray(np.max(self.left_of_each, axis=0))
 
     def _electric(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
         found: ComplexArray = self._finer._electric(self._at_fine(values), points)

@@ -36,11 +36,12 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import KDTree
 from scipy.special import gamma
 
 from creeping._typing import Any, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import SOFT, Boundary
-from creeping.field.currents.radiation import phase_sums
+from creeping.field.currents.radiation import field_of_scalar, phase_sums
 from creeping.field.equation.tiles import Tiles, gauss
 from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.patches import differentiation, interpolation, lobatto
@@ -162,6 +163,21 @@ class EdgeTerm:
         f = np.linalg.norm(both, axis=0) / np.pi
         mean = np.mean(f[len(directions) :] ** 2, axis=0)
         return np.asarray(np.sqrt(0.5 * (f[: len(directions)] ** 2 + mean)))
+
+    def near(self, values: ComplexArray, kind: str, points: FloatArray) -> FloatArray:
+        """Size of the field at points (m, 3), L, no closer to an edge than the nodes that it is read off: (m, c)."""
+        if not len(self.rings.points):
+            return np.zeros((len(points), values.shape[-1] if kind == "conductor" else 1))
+        away, nearest = KDTree(self.rings.points).query(points)
+        least = self._distance.max(axis=(1, 2))[nearest]
+        above = self.rings.points[nearest] + least[:, None] * self._normals[nearest, 0]
+        clear = np.where((away < least)[:, None], above, points)
+        both = [
+            field_of_scalar(self.rings.points, self.rings.tangents, None, strength.T, clear, self._k)
+            for strength in self.of(values, kind)
+        ]
+        # that is of a source e^{ikR}/(4 pi R)
+        return np.asarray(4 * np.linalg.norm(both, axis=0))
 
     def _forbidden(self, values: ComplexArray, *, soft: bool) -> ComplexArray:
         """C' dl (2, m, c) of values on both faces (m, 2, p, c)."""

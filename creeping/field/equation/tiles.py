@@ -207,6 +207,11 @@ class Tiles:
         """The same tiles with p x p nodes."""
         return Tiles.of(self.shapes, p, self.edges, conical=self.conical, lacks=self.lacks)
 
+    @cached_property
+    def reach(self) -> FloatArray:
+        """Lengths over which the polynomial of p x p nodes of each tile changes sign (t,), L."""
+        return np.asarray(np.sqrt(self.sizes * self.widths) / (2 * self.p + 1))
+
     @property
     def finer(self) -> int:
         """Fine nodes along a side of a tile: FINE of POINTS, tiles of fewer nodes are smaller."""
