@@ -101,9 +101,10 @@ class Echo(Drawn):
 
     def __repr__(self) -> str:
         told = self.summary()
+        kind = "pec" if self.quantity == "rcs" else self.channels[0]
         tops = ", ".join(f"{c} up to {'none' if v is None else f'{v:.1f}'}" for c, v in told["largest"].items())
         return (
-            f"Echo({told['quantity']}, {told['angles']} angles x {told['frequencies']} frequencies)\n"
+            f"Echo({told['quantity']}, {kind}, {told['angles']} angles x {told['frequencies']} frequencies)\n"
             f"  {tops} {told['unit']}; {told['unresolved']} of {told['values']} values unresolved"
         )
 
