@@ -113,7 +113,7 @@ def parse_body(
         raise InvalidInputError(f"{name}: is no part of a body; give the expression or equation alone: {rest!r}")
     if not (of_file or name in BODIES or _like_expression(text)):
         known = f"give one of {', '.join(BODIES)}, e.g. ellipsoid:a=1.2,b=0.8,c=0.8, a file ({', '.join(MESHES + CAD)})"
-        near = near_names(name, BODIES)
+        near = near_names(re.split(r"[^\w-]", text)[0], BODIES)
         raise InvalidInputError(f"unknown body {text!r}{near or f'; {known}, or an expression in x, y, z'}")
     belong = _belonging(suffix, of_file, name in BODIES)
     if alien := [option for option in given if option not in belong]:
@@ -180,7 +180,8 @@ def _named(name: str, rest: str, speed: str | None) -> Any:
         except ValueError:
             equals = ""
         if not equals:
-            raise InvalidInputError(f"body parameter {item!r} is not of the form name=number")
+            cure = f"give {', '.join(known)}, e.g. {name}:{next(iter(known))}=0.15; lengths are numbers of one unit"
+            raise InvalidInputError(f"body parameter {item!r} is not of the form name=number: {cure}")
         if key not in known:
             raise InvalidInputError(f"{name} has no parameter {key!r}; it has {', '.join(known)}")
         if key in values:

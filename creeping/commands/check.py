@@ -90,7 +90,7 @@ def _field(
     k = wavenumber or WAVELENGTHS / wavelengths_across(shape, 1.0)
     told = forecast(shape, k, "hard", **asked)
     answer["field"] = {"body": told.body, "wavenumber": k, "nodes": told.nodes, "by": told.by}
-    texts[:0] = [told.body, f"far field at k = {k:.4g}: {told.by}"]
+    texts[:0] = [told.body, f"far field, rigid, at k = {k:.4g}: {told.by}"]
 
 
 def _surface(

@@ -139,7 +139,7 @@ def _echo(
 ) -> int:
     from creeping.commands import echo_report
     from creeping.commands.echo_report import echo_request
-    from creeping.commands.forecast import forecast
+    from creeping.commands.forecast import boundary_words, forecast
     from creeping.field.boundary import parse_boundary
     from creeping.sweeping.echoes import echo_of, monostatic_method
 
@@ -173,7 +173,7 @@ def _echo(
         cure=request.cure,
     )
     if not as_json:
-        print(f"creeping: {told.body}", file=sys.stderr)
+        print(f"creeping: {told.body}, {boundary_words(boundary)}", file=sys.stderr)
     progress(f"{meter.asked(request)} by {told.by}")
     ready = time.perf_counter()
     dataset = echo_report.computed(shape, request, boundary, azimuths, elevations, method, made["cache"], meter.told)

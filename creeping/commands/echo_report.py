@@ -15,7 +15,7 @@ import numpy as np
 from creeping import plotting
 from creeping._typing import FloatArray
 from creeping._version import __version__
-from creeping.commands.forecast import KINDS, size_words
+from creeping.commands.forecast import boundary_words, size_words
 from creeping.commands.wave import cure_of
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import BoundaryLike, boundary_name, parse_boundary
@@ -135,7 +135,9 @@ def echo_request(
     assert text is not None
     try:
         if is_length(text) != (wavelength is not None):
-            raise InvalidInputError(f"{text!r} is a {'wavelength' if wavelength is None else 'frequency'}")
+            raise InvalidInputError(
+                f"{text!r} is a length: --wavelength" if wavelength is None else f"{text!r}: give e.g. {text}cm"
+            )
         numbers = np.unique(np.atleast_1d(wavenumber(text, sound_speed=sound_speed)))
     except InvalidInputError as error:
         raise InvalidInputError(f"{option}: {error}") from error
@@ -449,8 +451,7 @@ def readable(summary: dict[str, Any], output: Path) -> str:
         f"{channel} up to {value:.2f}" if value is not None else f"{channel} nothing finite"
         for channel, value in summary["largest"].items()
     )
-    kind = KINDS.get(summary["boundary"], summary["boundary"])
-    rows = [f"{summary['quantity']} of {summary['body']}, {kind}, {unit}: {tops}"]
+    rows = [f"{summary['quantity']} of {summary['body']}, {boundary_words(summary['boundary'])}, {unit}: {tops}"]
     if summary["error_db_median"] is not None:
         rows.append(
             f"stated error: {summary['error_db_median']:.2g} dB in the median, "

@@ -8,7 +8,7 @@ from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked_across, wavelengths_across
 from creeping.field.boundary import BoundaryLike, boundary_name
-from creeping.field.equation.solving import is_large, plan_of
+from creeping.field.equation.solving import ASKED, SECONDS, is_large, plan_of
 from creeping.field.tmatrix.computing import expected
 from creeping.field.validity_range import EDGE, body_validity
 from creeping.geometry.directions import azimuth_elevation_of
@@ -32,6 +32,18 @@ class Forecast(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.body}: {self.by}"
+
+
+def boundary_words(*boundaries: BoundaryLike) -> str:
+    """What the surface is to the wave.
+
+    Examples
+    --------
+    >>> boundary_words("soft", "pec"), boundary_words("impedance:0.5")
+    ('soft (pressure release) and perfect conductor', 'impedance:0.5')
+    """
+    names = [boundary_name(one) for one in boundaries]
+    return " and ".join(KINDS.get(name, name) for name in names)
 
 
 def duration(seconds: float) -> str:
@@ -89,8 +101,7 @@ def forecast(
     without, pieces = why_no_rays(shape), is_piecewise(shape)
     kind = without or (f"in smooth pieces with {len(shape.creases)} creases" if pieces else "one smooth surface")
     size = size_words(shape, k, metres=metres, cure=cure)
-    name = boundary_name(boundary)
-    body = f"body: {kind}, {size}, {KINDS.get(name, name)}"
+    body = f"body: {kind}, {size}"
     incidences = None if radar is None else (np.atleast_1d(radar[0]), np.atleast_1d(radar[1]))
     count, top = 1 if incidences is None else len(incidences[0]), float(k.max())
     if method == "rays":
@@ -103,7 +114,7 @@ def forecast(
     if smooth and is_large(shape, top, boundary) and method != "equation":
         nodes, refused, equation = 0, "it is too large", ""
     else:
-        solved = plan_of(shape, top, boundary, incidences=count)
+        solved = plan_of(shape, top, boundary, ASKED if method == "equation" else SECONDS, incidences=count)
         # nodes grow with the area in square wavelengths, and what pairs of them take with the square of that
         share = float(np.sum((k / top) ** 4))
         nodes, refused = solved.nodes, solved.refused

@@ -96,7 +96,7 @@ def _as_options(text: str) -> str:
         gap = " " if value or found[0].endswith(" ") else ""
         return f"--{found[1].replace('_', '-')}{gap}{value}"
 
-    return re.sub(pattern, option, text)
+    return re.sub(pattern, option, re.sub("^boundary ", "--boundary ", text))
 
 
 @app.command
@@ -178,6 +178,7 @@ def run(
     import numpy as np
 
     import creeping as cr
+    from creeping.commands import forecast as _forecast
     from creeping.commands import run_field as _field_run
     from creeping.commands import run_plane as _plane_run
     from creeping.commands import run_report as _run_results
@@ -200,8 +201,9 @@ def run(
         planes = _plane_run.asked_planes(plane, job)
         if job:
             told = job.forecast(shape, incident)
-            progress.note(told.body + ("" if boundary else "; --boundary gives another"))
-            progress.note(f"far field by {told.by}")
+            progress.note(told.body)
+            kind = _forecast.boundary_words(job.boundary)
+            progress.note(f"{kind}{'' if boundary else ', as no --boundary is given'}: far field by {told.by}")
             job = job.fitted(shape)
         if why_no_rays(shape):
             result = _run_solved.run_solved(

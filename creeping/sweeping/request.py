@@ -286,6 +286,8 @@ def sweep_request(
         With all mistakes at once, as ``mistakes`` too.
     """
     several = boundary if isinstance(boundary, (list, tuple)) else (boundary,)
+    if isinstance(wavenumbers, str):
+        checked(wavenumbers, 2)  # type: ignore[arg-type]
     given = np.atleast_1d(real_array(wavenumbers, "wavenumbers"))
     if given.ndim > 1 or given.size > MOST_WAVENUMBERS:
         raise InvalidInputError(f"wavenumbers have shape {given.shape}; give a number or at most {MOST_WAVENUMBERS}")

@@ -171,7 +171,7 @@ def test_bad_options_of_files_are_exit_code_3(balls, options, match, capsys):
 @pytest.mark.parametrize(
     "name, match",
     [
-        ("hull.vtk", "hull.vtk is a VTK file; export the body as a mesh"),
+        ("hull.vtk", "hull.vtk is a VTK file; save its surface as STL"),
         ("hull.step", "hull.step does not begin as STEP files do: it is a VTK file"),
         ("hull", "hull is a VTK file"),
     ],
