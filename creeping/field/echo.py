@@ -115,8 +115,9 @@ class Echo(Drawn):
 
     @property
     def hertz(self) -> FloatArray:
-        """Frequencies (k,), Hz."""
-        return np.asarray(frequency(self.wavenumbers, sound_speed=self.sound_speed))
+        """Frequencies (k,), Hz, to 14 digits: what wavenumbers and ranges round is the digit behind them."""
+        found = np.atleast_1d(frequency(self.wavenumbers, sound_speed=self.sound_speed))
+        return np.array([float(f"{value:.14g}") for value in found])
 
     @property
     def level_name(self) -> tuple[str, str]:

@@ -39,6 +39,7 @@ def test_map_of_target_strength_without_pictures(tmp_path, capsys):
     summary = json.loads(capsys.readouterr().out)
     assert summary["unit"] == "dB re 1 m" and summary["files"] == ["ts.csv", "ts.mat", "summary.json"]
     rows = table(tmp_path / "ts.csv")
+    assert {row["frequency_hz"] for row in rows} == {"200000.0", "220000.0"}
     assert len(rows) == 6 and {row["azimuth_deg"] for row in rows} == {"0.0", "10.0", "20.0"}
     # sqrt(rho1 rho2)/2 at the nose: b c/a/2
     assert float(rows[0]["level_db"]) == pytest.approx(20 * np.log10(0.05 * 0.04 / 0.06 / 2), abs=1.0)
