@@ -22,8 +22,11 @@ def test_band_of_a_sphere_with_a_comparison(tmp_path, capsys):
     out = tmp_path / "out"
     words = ["sphere:radius=0.15", "--frequency", "8:10.4:0.15GHz", "--compare", given, "-o", out]
     assert ran("rcs", *words, "--no-cache") == 0
-    said = capsys.readouterr().out
+    said, told = capsys.readouterr()
     assert "VV against the reference at 3 places" in said and "range profile" in said
+    # 0.3 m in wavelengths of 3.75 to 2.88 cm
+    assert "0.3 m, 8.01 to 10.4 wavelengths across, perfect conductor" in told and "creeping rays and surface" in told
+    assert "cross section of sphere:radius=0.15, perfect conductor, dBsm" in said.splitlines()[0]
     summary = json.loads((out / "summary.json").read_text())
     assert summary["values"] == 34 and summary["unresolved"] == 0
     assert summary["compared"]["VV"]["rms_db"] < 0.3
