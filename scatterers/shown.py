@@ -18,7 +18,7 @@ class Shown:
         text, unit = " ".join(repr(body).split()), getattr(body, "unit", "L")
         rows = {
             "body": text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}...",
-            "size": f"{' x '.join(f'{side:.4g}' for side in body.bounds[1] - body.bounds[0])} {unit}",
+            "box": f"{' x '.join(f'{side:.4g}' for side in body.bounds[1] - body.bounds[0])} {unit}",
             "lengths": "metres" if unit == "m" else f"{unit}, any unit; wavenumbers are in its inverse",
         }
         if getattr(body, "creases", ()):

@@ -6,11 +6,13 @@ import numpy as np
 
 from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.arguments import checked_across, wavelengths_across
+from creeping.field.arguments import checked_across
 from creeping.field.boundary import BoundaryLike, boundary_name
 from creeping.field.equation.solving import ASKED, SECONDS, is_large, plan_of
 from creeping.field.tmatrix.computing import expected
 from creeping.field.validity_range import EDGE, body_validity
+from creeping.geodesics.equations import points_of_charts
+from creeping.geometry.checks import unit_of
 from creeping.geometry.directions import azimuth_elevation_of
 from creeping.geometry.parts import why_no_rays
 from creeping.geometry.piecewise import has_edges, is_piecewise
@@ -68,10 +70,10 @@ def size_words(shape: Any, wavenumbers: ArrayLike, *, metres: bool, cure: str) -
         If no field is known of a body so small or large; ``cure`` says what to give.
     """
     k = np.atleast_1d(np.asarray(wavenumbers, dtype=float))
-    ends = [wavelengths_across(shape, float(end)) for end in (k.min(), k.max())]
-    unit = "m" if metres else getattr(shape, "unit", "L")
+    unit, side = "m" if metres else unit_of(shape), _longest(shape)
+    ends = [side * float(end) / (2 * np.pi) for end in (k.min(), k.max())]
     told = " to ".join(dict.fromkeys(f"{end:.3g}" for end in ends))
-    size = f"{ends[0] * 2 * np.pi / k.min():.4g} {unit}, {told} wavelengths across"
+    size = f"{side:.4g} {unit}, {told} wavelengths across"
     try:
         checked_across(shape, float(k.min()), float(k.max()))
     except InvalidInputError as error:
@@ -79,6 +81,13 @@ def size_words(shape: Any, wavenumbers: ArrayLike, *, metres: bool, cure: str) -
         raise InvalidInputError(f"the body is {size}, too {word} for any field; {cure}") from error
     doubt = "small" if ends[1] < SMALL else "large" if ends[0] > LARGE else ""
     return f"{size} (so {doubt}? {cure})" if doubt else size
+
+
+def _longest(shape: Any) -> float:
+    """Longest side of the body, L: of its own points where its bounds are those of a grid about it."""
+    padded = any(hasattr(shape, name) for name in ("fit", "expression"))
+    points = points_of_charts(shape) if padded and not why_no_rays(shape) else np.asarray(shape.bounds, dtype=float)
+    return float(np.max(np.ptp(points, axis=0)))
 
 
 def forecast(
