@@ -3,6 +3,7 @@
 A message names what, how many, the worst and the remedy; the numbers are attributes as well.
 """
 
+from collections.abc import Iterable
 from typing import Any
 
 
@@ -55,3 +56,20 @@ class ToleranceError(CreepingError):
 
 class StoredMapError(CreepingError):
     """A stored phase map is damaged, of another version or of another body."""
+
+
+def near_names(name: str, known: Iterable[str]) -> str:
+    """The end of a message about an unknown name: those that begin like it, or are spelled almost so, if any.
+
+    Examples
+    --------
+    >>> near_names("backscater", ["backscatter", "bistatic"]), near_names("fig6", ["fig6-a", "fig6-b"])
+    ('; did you mean backscatter?', '; did you mean fig6-a or fig6-b?')
+    """
+    from difflib import get_close_matches
+
+    names = {one.lower().replace("_", ""): one for one in known}
+    asked = name.lower().replace("_", "")
+    close = [one for short, one in names.items() if asked and short.startswith(asked)]
+    close = close or [names[short] for short in get_close_matches(asked, names)]
+    return f"; did you mean {' or '.join(close)}?" if close else ""

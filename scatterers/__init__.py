@@ -36,3 +36,12 @@ __all__ = [
     "TwistedEllipsoid",
     "examined_mesh",
 ]
+
+
+def __getattr__(name: str) -> object:
+    from difflib import get_close_matches
+
+    names = {one.lower(): one for one in __all__}
+    near = [names[one] for one in get_close_matches(name.lower(), names)]
+    told = f"; did you mean {' or '.join(near)}?" if near else f"; it has {', '.join(__all__)}"
+    raise AttributeError(f"scatterers has no {name!r}{told}", name=name)

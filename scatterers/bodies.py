@@ -6,11 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scatterers.shown import Shown
+
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 
-class Bodies:
+class Bodies(Shown):
     """Bodies that scatter together, none of which touches another.
 
     Parameters

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.cad_file.files import SUFFIXES, CadReading, cad_triangles
+from scatterers.shown import Shown
 from scatterers.triangles.files import read_mesh
 from scatterers.triangles.quality import Choice
 
@@ -31,14 +32,14 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 
-class Facets:
+class Facets(Shown):
     """Body bounded by the flat triangles of a closed mesh, in metres.
 
     Parameters
     ----------
     source : path, or object with ``vertices`` and ``faces``
-        STL, OBJ, PLY, OFF, GLB, 3MF, MSH or BDF file, or e.g. a trimesh.Trimesh; each of its parts is closed. Or a
-        STEP, IGES or BREP file, whose triangles have their corners on it.
+        STL, OBJ, PLY, OFF, GLB, 3MF, MSH, BDF or MESH file, or e.g. a trimesh.Trimesh; each of its parts is closed. Or
+        a STEP, IGES or BREP file, whose triangles have their corners on it.
     units : {"m", "mm", "cm", "um", "in", "ft", "km"}, optional
         Unit of the numbers; must be given for files that do not state it. An object's numbers are metres by default.
     part : str or int, optional

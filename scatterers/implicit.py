@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scatterers.base.level_body import LevelBody, numbers, positive
 from scatterers.exact.body import SHARP, Piece, no_charts
 from scatterers.exact.clipped import clip, creases, march, normals
+from scatterers.expression.parsing import one_sided
 from scatterers.expression.singularities import (
     FINE,
     SIZES,
@@ -54,7 +55,8 @@ class Implicit(LevelBody):
     ----------
     expression : str
         Numbers, x, y, z, pi, + - * / **, parentheses, sqrt, exp, log, sin, cos, tan, sinh, cosh, tanh, and
-        max(a, b, ...), min(a, b, ...) and where(x < 0, a, b); negative inside the body, positive outside.
+        max(a, b, ...), min(a, b, ...) and where(x < 0, a, b); negative inside the body, positive outside. Of an
+        equation, ``"x**2 + y**2 = 1 - z**2"``, the left side less the right.
     bounds : (2, 3) array_like, optional
         Box that contains the body and nothing else, L; found if not given, for bodies that a cube about the origin with
         half width 2^-8 to 2^12 resolves.
@@ -96,6 +98,7 @@ class Implicit(LevelBody):
     ) -> None:
         if not isinstance(strict, bool):
             raise ValueError(f"strict = {strict!r} is neither True nor False")
+        expression = one_sided(expression)
         everywhere = ExpressionSpace(expression, np.array([[-SIZES[-1]] * 3, [SIZES[-1]] * 3]))
         self.expression = expression
         self.speed = speed

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from creeping.errors import InvalidInputError
+from creeping.errors import InvalidInputError, near_names
 
 BODIES = {
     "sphere": "Sphere",
@@ -28,7 +28,7 @@ BODIES = {
     "double-ogive": "DoubleOgive",
     "almond": "Almond",
 }
-MESHES = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf", ".msh", ".bdf", ".nas", ".gz")
+MESHES = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf", ".msh", ".bdf", ".nas", ".mesh", ".gz")
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
 FILE_OPTIONS = ("units", "strict", "part", "cap", "union")
 FORMATS = ("csv", "mat")
@@ -41,7 +41,7 @@ Body = Annotated[
     str,
     Parameter(
         help="Name with parameters, e.g. torus or ellipsoid:a=1.2,b=0.8,c=0.8; a file, e.g. hull.stl or hull.step; "
-        "or an expression F(x, y, z), negative inside, e.g. 'x**2 + y**4 + z**2 - 1'."
+        "or an expression F(x, y, z), negative inside, or an equation, e.g. 'x**2 + y**4 + z**2 = 1'."
     ),
 ]
 SpeedOption = Annotated[str | None, Parameter(help="Speed c(x, y, z) of the weighted flow, e.g. '1 + x'.")]
@@ -105,16 +105,16 @@ def parse_body(
         Names the unknown body, parameter or value, and what is known; or what is wrong with the file or expression.
     """
     import scatterers
-    from creeping.errors import InvalidInputError
 
     suffix, of_file = Path(text).suffix.lower(), is_file(text)
     name, _, rest = text.partition(":")
     given = options.given()
+    if ":" in text and not of_file and name not in BODIES and _like_expression(rest):
+        raise InvalidInputError(f"{name}: is no part of a body; give the expression or equation alone: {rest!r}")
     if not (of_file or name in BODIES or _like_expression(text)):
-        raise InvalidInputError(
-            f"unknown body {text!r}; give one of {', '.join(BODIES)}, e.g. ellipsoid:a=1.2,b=0.8,c=0.8, a file "
-            f"({', '.join(MESHES + CAD)}), or an expression in x, y, z"
-        )
+        known = f"give one of {', '.join(BODIES)}, e.g. ellipsoid:a=1.2,b=0.8,c=0.8, a file ({', '.join(MESHES + CAD)})"
+        near = near_names(re.split(r"[^\w-]", text)[0], BODIES)
+        raise InvalidInputError(f"unknown body {text!r}{near or f'; {known}, or an expression in x, y, z'}")
     belong = _belonging(suffix, of_file, name in BODIES)
     if alien := [option for option in given if option not in belong]:
         what = f"{name} takes none" if not belong else f"{text!r} takes --{', --'.join(belong)}"
@@ -134,7 +134,8 @@ def parse_body(
     except InvalidInputError:
         raise
     except (TypeError, ValueError, ModuleNotFoundError) as error:
-        raise InvalidInputError(f"{text if len(text) < 60 else text[:57] + '...'}: {error}") from error
+        named = "" if str(error).startswith(text) else f"{text if len(text) < 60 else text[:57] + '...'}: "
+        raise InvalidInputError(f"{named}{error}") from error
 
 
 def _belonging(suffix: str, of_file: bool, named: bool) -> tuple[str, ...]:
@@ -168,7 +169,6 @@ def _with_charts(shape: Any, progress: Progress | None) -> Any:
 
 def _named(name: str, rest: str, speed: str | None) -> Any:
     import scatterers
-    from creeping.errors import InvalidInputError
 
     make = getattr(scatterers, BODIES[name])
     known = {key: p for key, p in inspect.signature(make).parameters.items() if key != "speed"}
@@ -180,7 +180,8 @@ def _named(name: str, rest: str, speed: str | None) -> Any:
         except ValueError:
             equals = ""
         if not equals:
-            raise InvalidInputError(f"body parameter {item!r} is not of the form name=number")
+            cure = f"give {', '.join(known)}, e.g. {name}:{next(iter(known))}=0.15; lengths are numbers of one unit"
+            raise InvalidInputError(f"body parameter {item!r} is not of the form name=number: {cure}")
         if key not in known:
             raise InvalidInputError(f"{name} has no parameter {key!r}; it has {', '.join(known)}")
         if key in values:

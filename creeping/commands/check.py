@@ -43,10 +43,13 @@ def check(
 
     if wavenumber is not None and not 0 < wavenumber < float("inf"):
         raise InvalidInputError(f"--wavenumber {wavenumber!r} is not a positive finite number")
+    asked: dict[str, Any] = {}
     if any(value is not None for value in (wavenumber, frequency, wavelength, sound_speed)):
-        from creeping.commands.wave import asked_wavenumber
+        from creeping.commands.wave import asked_wavenumber, cure_of
 
-        wavenumber, _ = asked_wavenumber(wavenumber, frequency, wavelength, sound_speed)
+        option, text = ("--frequency", frequency or wavelength) if wavenumber is None else ("--wavenumber", wavenumber)
+        wavenumber, hertz = asked_wavenumber(wavenumber, frequency, wavelength, sound_speed)
+        asked = {"metres": hertz is not None, "cure": cure_of(option, text, hertz)}
     mesh = is_file(body) and Path(body).suffix.lower() not in CAD
     if wavenumber is not None and speed is not None:
         raise InvalidInputError("--wavenumber is for rays of constant speed; leave out one of --speed and --wavenumber")
@@ -71,54 +74,33 @@ def check(
         ok, answer["refused"] = False, str(refusal)
         texts.append(f"refused: {refusal}")
     else:
-        ok = _surface(shape, wavenumber, answer, texts)
+        ok = _surface(shape, wavenumber, answer, texts, asked)
     answer["ok"] = ok
     print(json.dumps(answer, indent=1) if json_ else "\n".join(texts))
     return 0 if ok else 3
 
 
-def _field(shape: Any, wavenumber: float | None, answer: dict[str, Any], texts: list[str]) -> None:
+def _field(
+    shape: Any, wavenumber: float | None, answer: dict[str, Any], texts: list[str], asked: dict[str, Any]
+) -> None:
     """What a field of the body is made by, what that takes, and about which error it has."""
-    import numpy as np
+    from creeping.commands.forecast import forecast
+    from creeping.field.arguments import wavelengths_across
 
-    from creeping.field.body_currents import POOR
-    from creeping.field.equation.solving import plan_of
-    from creeping.geometry.parts import why_no_rays
-    from creeping.geometry.piecewise import has_edges, is_piecewise
-
-    without = why_no_rays(shape)
-    kind = without or (
-        f"in smooth pieces with {len(shape.creases)} creases" if is_piecewise(shape) else "one smooth surface"
-    )
-    size = float(np.max(np.ptp(np.asarray(shape.bounds, dtype=float), axis=0)))
-    k = wavenumber or 2 * np.pi * WAVELENGTHS / size
-    plan = plan_of(shape, k, "hard")
-    equation = (
-        f"the integral equation between {plan.nodes} nodes, about {plan.seconds:.2g} s and {plan.memory / 1e9:.2g} GB "
-        "an incidence, errors of 0.01 to 1 % of the largest |f|"
-    )
-    expansions = "creeping rays and currents by expansions"
-    if not plan.refused and (without or is_piecewise(shape)):
-        by = equation
-    elif not plan.refused:
-        by = f"{expansions}; where these leave more than {100 * POOR:g} % of the wave inside, {equation}"
-    elif without:
-        by = f"nothing within half a minute: {plan.refused}; creeping.solve(..., seconds=) takes as long as it may"
-    elif has_edges(shape):
-        by = f"rays and physical optics, which err by several per cent: the equation is not solved, {plan.refused}"
-    else:
-        by = expansions
-    answer["field"] = {"body": kind, "wavenumber": k, "nodes": plan.nodes, "by": by}
-    texts.insert(0, f"body: {kind}")
-    texts.insert(1, f"far field at k = {k:.4g}, {size * k / (2 * np.pi):.3g} wavelengths across: {by}")
+    k = wavenumber or WAVELENGTHS / wavelengths_across(shape, 1.0)
+    told = forecast(shape, k, "hard", **asked)
+    answer["field"] = {"body": told.body, "wavenumber": k, "nodes": told.nodes, "by": told.by}
+    texts[:0] = [told.body, f"far field, rigid, at k = {k:.4g}: {told.by}"]
 
 
-def _surface(shape: Any, wavenumber: float | None, answer: dict[str, Any], texts: list[str]) -> bool:
+def _surface(
+    shape: Any, wavenumber: float | None, answer: dict[str, Any], texts: list[str], asked: dict[str, Any]
+) -> bool:
     from creeping import check_surface
     from creeping.geometry.parts import why_no_rays
 
     if getattr(shape, "speed", None) is None:
-        _field(shape, wavenumber, answer, texts)
+        _field(shape, wavenumber, answer, texts, asked)
     if why_no_rays(shape):
         answer["repairs"] = list(getattr(shape, "repairs", ()))
         texts += answer["repairs"]

@@ -13,10 +13,6 @@ from cyclopts import Group, Parameter
 
 from creeping.commands.body import AS_IT_IS, HELP, Body, FileOptions, parse_body, table_formats
 
-TOLD = 90.0
-"""Seconds from which it is said beforehand what a request may cost."""
-
-
 _angles = Group("Angles")
 _output = Group("Output")
 Frequency = Annotated[
@@ -27,8 +23,8 @@ Monostatic = Annotated[
     str | None,
     Parameter(
         group=_angles,
-        help="Backscatter in a cut: az, el, az:STEP or az:FIRST:LAST:STEP, degrees; the step fits the lobes if not "
-        "given. Taken for one frequency if nothing else is asked for.",
+        help="Backscatter in a cut: az or el, whose step fits the lobes, or az:FIRST:LAST:STEP, degrees; az:20 or "
+        "az:20,el:5 is one direction. az for one frequency if nothing else is asked for.",
     ),
 ]
 Bistatic = Annotated[
@@ -143,11 +139,15 @@ def _echo(
 ) -> int:
     from creeping.commands import echo_report
     from creeping.commands.echo_report import echo_request
+    from creeping.commands.forecast import boundary_words, forecast
     from creeping.field.boundary import parse_boundary
-    from creeping.sweeping.echoes import echo_of
+    from creeping.sweeping.echoes import echo_of, monostatic_method
 
     started = time.perf_counter()
     request = echo_request(quantity, **asked)
+    for name in ("monostatic", "bistatic", "incidence"):
+        if hint := echo_report.radians_hint(f"--{name}", asked[name]):
+            print(f"creeping: {hint}", file=sys.stderr)
     boundary = parse_boundary(request.boundary)
     written["formats"] = table_formats(written["formats"])
     # before the time is spent
@@ -160,7 +160,21 @@ def _echo(
     shape = parse_body(body, progress=progress, **made)
     azimuths, elevations = request.angles(shape)
     meter = _Meter(progress, len(azimuths) * len(request.wavenumbers))
-    progress(meter.asked(request) + _cost(shape, request, azimuths, elevations, method))
+    if method == "auto" and request.monostatic:
+        method = monostatic_method(shape, request.wavenumbers, boundary, len(azimuths))
+    told = forecast(
+        shape,
+        request.wavenumbers,
+        boundary,
+        method=method,
+        radar=(azimuths, elevations) if request.monostatic else request.incidence,
+        observers=1 if request.monostatic else len(azimuths),
+        metres=True,
+        cure=request.cure,
+    )
+    if not as_json:
+        print(f"creeping: {told.body}, {boundary_words(boundary)}", file=sys.stderr)
+    progress(f"{meter.asked(request)} by {told.by}")
     ready = time.perf_counter()
     dataset = echo_report.computed(shape, request, boundary, azimuths, elevations, method, made["cache"], meter.told)
     echo = echo_of(dataset, quantity, request.channels, request.angle_name, sound_speed=request.sound_speed)
@@ -177,18 +191,6 @@ def _echo(
     write_text(output / "summary.json", json.dumps(summary, indent=1) + "\n")
     print(json.dumps(summary, indent=1) if as_json else echo_report.readable(summary, output))
     return 0
-
-
-def _cost(shape: Any, request: Any, azimuths: Any, elevations: Any, method: str) -> str:
-    """What it may take where that is minutes: currents serve what rays cannot, hundreds of times as slowly."""
-    from creeping.sweeping.echoes import seconds_of_currents
-
-    if method == "rays" or not request.monostatic:
-        return ""
-    seconds = seconds_of_currents(shape, request.wavenumbers, azimuths, elevations, boundary=request.boundary)
-    if seconds < TOLD:
-        return ""
-    return f"; up to about {seconds / 60:.0f} min if currents of the body must serve all (--method rays: seconds)"
 
 
 class _Meter:

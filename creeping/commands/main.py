@@ -5,9 +5,9 @@ so that ``creeping --help`` answers at once.
 """
 
 import json
+import re
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -54,7 +54,7 @@ def main(arguments: list[str] | None = None) -> None:
     except CycloptsError:
         code = 2
     except CreepingError as error:
-        print(f"creeping: {error}", file=sys.stderr)
+        print(f"creeping: {_as_options(str(error))}", file=sys.stderr)
         code = 3
     except KeyboardInterrupt:
         print("creeping: interrupted", file=sys.stderr)
@@ -72,6 +72,31 @@ def main(arguments: list[str] | None = None) -> None:
         print(f"creeping: {error}", file=sys.stderr)
         code = 3
     raise SystemExit(code if isinstance(code, int) else 0)
+
+
+def _as_options(text: str) -> str:
+    """A message of the library with the options of this command line for its arguments.
+
+    Examples
+    --------
+    >>> _as_options("take one, e.g. part='largest', or all with union=True; sound_speed = 1 m/s is slow")
+    'take one, e.g. --part largest, or all with --union; --sound-speed 1 m/s is slow'
+    """
+    from dataclasses import fields
+    from inspect import signature
+
+    names = {field.name for field in fields(FileOptions)}
+    names.update(*(signature(command).parameters for command in (run, _echo_command.ts)))
+    # k is in messages whichever of three options gave it
+    words = "|".join(sorted(names - {"wavenumber", "body", "file"}, key=len, reverse=True))
+    pattern = rf"(?<![\w.-])({words})(?:=| = )(?:'([^']*)'|\"([^\"]*)\"|True\b)?"
+
+    def option(found: re.Match[str]) -> str:
+        value = found[2] or found[3] or ""
+        gap = " " if value or found[0].endswith(" ") else ""
+        return f"--{found[1].replace('_', '-')}{gap}{value}"
+
+    return re.sub(pattern, option, re.sub("^boundary ", "--boundary ", text))
 
 
 @app.command
@@ -153,6 +178,7 @@ def run(
     import numpy as np
 
     import creeping as cr
+    from creeping.commands import forecast as _forecast
     from creeping.commands import run_field as _field_run
     from creeping.commands import run_plane as _plane_run
     from creeping.commands import run_report as _run_results
@@ -174,6 +200,10 @@ def run(
         shape = parse_body(body, speed, options=file, cache=cache, progress=progress)
         planes = _plane_run.asked_planes(plane, job)
         if job:
+            told = job.forecast(shape, incident)
+            progress.note(told.body)
+            kind = _forecast.boundary_words(job.boundary)
+            progress.note(f"{kind}{'' if boundary else ', as no --boundary is given'}: far field by {told.by}")
             job = job.fitted(shape)
         if why_no_rays(shape):
             result = _run_solved.run_solved(
@@ -283,7 +313,7 @@ def figure(
 ) -> int:
     """Draw figures of the paper, each with a sidecar of its parameters, error and seconds."""
     studies = _studies()
-    from creeping.errors import InvalidInputError
+    from creeping.errors import InvalidInputError, near_names
 
     if list_:
         print("\n".join(f"{key:16} {title}" for key, title in studies.titles().items()))
@@ -291,7 +321,8 @@ def figure(
     if all_ == (name is not None):
         raise InvalidInputError(f"give one figure or --all; figures are {', '.join(studies.FIGURES)}")
     if name is not None and name not in studies.FIGURES:
-        raise InvalidInputError(f"unknown figure {name!r}; figures are {', '.join(studies.FIGURES)}")
+        near = near_names(name, studies.FIGURES) or f"; figures are {', '.join(studies.FIGURES)}"
+        raise InvalidInputError(f"unknown figure {name!r}{near}")
     cards = []
     with _Progress(quiet=json_) as progress:
         for key in studies.FIGURES if name is None else [name]:
@@ -323,15 +354,22 @@ class _Progress:
         self.quiet = quiet
         self._status: Any = None
 
-    def __enter__(self) -> Callable[[str], None]:
+    def __enter__(self) -> "_Progress":
         if not self.quiet and sys.stderr.isatty():
             from rich.console import Console
 
             self._status = Console(stderr=True).status("starting")
             self._status.start()
-        return self.progress
+        return self
 
-    def progress(self, text: str) -> None:
+    def note(self, text: str) -> None:
+        """Show what is to stay."""
+        if self._status is not None:
+            self._status.console.print(f"creeping: {text}", highlight=False, markup=False, soft_wrap=True)
+        elif not self.quiet:
+            print(f"creeping: {text}", file=sys.stderr, flush=True)
+
+    def __call__(self, text: str) -> None:
         """Show what is being done now."""
         if self._status is not None:
             self._status.update(text)

@@ -11,7 +11,8 @@ import numpy as np
 from creeping import files, plotting
 from creeping._typing import ArrayLike, FloatArray
 from creeping.commands.body import write_tables
-from creeping.commands.wave import asked_wavenumber, frequency_words
+from creeping.commands.forecast import Forecast, forecast, radar_of
+from creeping.commands.wave import asked_wavenumber, cure_of, frequency_words
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.body_currents import cached_currents
 from creeping.field.boundary import BoundaryLike, parse_boundary
@@ -36,6 +37,7 @@ DPI = 200
 MOST = 200_000
 """Directions of one run."""
 FORMS = "cut:PHI, cut:PHI:STEP, grid:STEP, THETA,PHI or backscatter, in degrees"
+WAVES = ("--wavenumber", "--frequency", "--wavelength")
 FINEST = 0.05
 """Step, degrees, of a cut that is not given one, at the least."""
 POLARISATIONS = {"VV": "tt", "VH": "tp", "HV": "pt", "HH": "pp"}
@@ -82,6 +84,8 @@ class Job:
     """Of lengths: "m" if a frequency was asked for, else what the body says."""
     frequency: float | None = None
     components: tuple[str, ...] = ("tt", "pp")
+    cure: str = ""
+    """What to look at where the body has an absurd size in wavelengths."""
 
     def fitted(self, body: Surface) -> "Job":
         """The job with cuts whose step fits the lobes, of those that have none given."""
@@ -95,6 +99,18 @@ class Job:
         count = sum(len(target.directions) for target in self.targets)
         if count > MOST:
             raise InvalidInputError(f"--observe asks for {count} directions; {MOST} are the most: give a coarser step")
+
+    def forecast(self, body: Surface, incident: Any) -> Forecast:
+        """What the field is made by, and how well."""
+        return forecast(
+            body,
+            self.wavenumber,
+            self.boundary,
+            radar=radar_of(incident.direction),
+            observers=len(self.directions),
+            metres=self.unit == "m",
+            cure=self.cure,
+        )
 
     def told(self, unit: str) -> str:
         """Wavenumber and frequency in words."""
@@ -282,7 +298,8 @@ def job(
         raise InvalidInputError("--observe names several grids; give one, far.ffe holds no more")
     kind = _boundary(boundary or "soft")
     unit = "m" if wavenumber is None else None
-    found = Job(k, kind, targets, unit, hertz, _components(polarisation, kind))
+    ((option, text),) = ((name, value) for name, value in zip(WAVES, given, strict=True) if value is not None)
+    found = Job(k, kind, targets, unit, hertz, _components(polarisation, kind), cure_of(option, text, hertz))
     found.check_count()
     return found
 

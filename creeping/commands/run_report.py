@@ -137,12 +137,14 @@ def _level(field: dict[str, Any]) -> str:
 
 def readable(summary: dict[str, Any], output: Path) -> str:
     """The summary as a person reads it."""
+    from creeping.commands.forecast import boundary_words
     from creeping.commands.run_plane import plane_words
     from creeping.field.validity_range import Validity, validity_words
 
     name, place = ("d", summary["direction"]) if "direction" in summary else ("source at", summary["source"])
     equals = " =" if name == "d" else ""
-    rows = [f"{summary['body']}, {name}{equals} ({', '.join(f'{v:.4f}' for v in place)})"]
+    kind = f", {boundary_words(summary['field']['boundary'])}" if "field" in summary else ""
+    rows = [f"{summary['body']}{kind}, {name}{equals} ({', '.join(f'{v:.4f}' for v in place)})"]
     for k, curve in enumerate(summary["shadow_line"]):
         shares = ", ".join(f"{100 * v:.1f} % {name}" for name, v in curve["fractions"].items() if v > 0)
         rows.append(f"shadow line {k + 1}: length {curve['length']:.10f}, {shares}")

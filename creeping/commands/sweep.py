@@ -110,6 +110,8 @@ def sweep(
 
 def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Any) -> tuple[Any, Any]:
     """Plan and store of a study; the flow of a sweep that goes on is the one it was begun with."""
+    from creeping.commands.forecast import boundary_words, forecast
+    from creeping.field.boundary import parse_boundary
     from creeping.sweeping.between.worth import with_paying_lattice
     from creeping.sweeping.plan import SweepPlan, task_size
     from creeping.sweeping.request import in_patches
@@ -125,6 +127,10 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Any)
         text, read.speed, options=FileOptions(units=read.units, **read.file), cache=cache, progress=progress
     )
     request = read.request_for(body)
+    if request.wavenumbers:
+        told = forecast(body, request.wavenumbers, parse_boundary(request.boundaries[0]), method=request.method)
+        progress(f"{told.body}, {boundary_words(*request.boundaries)}")
+        progress(f"each incidence by {told.by}")
     progress("flow")
     if resume and folder.exists():
         store = SweepStore.open(folder, mending=True)

@@ -51,3 +51,18 @@ def asked_wavenumber(
         return checked(found, 2), float(hertz_of(found, sound_speed=sound_speed))
     except InvalidInputError as error:
         raise InvalidInputError(f"{option}: {error}") from error
+
+
+def cure_of(option: str, text: object, hertz: float | None) -> str:
+    """What to look at where a body has an absurd size in wavelengths: how the wave was understood.
+
+    Examples
+    --------
+    >>> cure_of("--frequency", "10", 10.0), cure_of("--wavelength", "3cm", 1e10)
+    ('--frequency 10 is 10 Hz, give e.g. 10GHz', 'lengths are metres, of a file in its --units')
+    """
+    if hertz is None:
+        return f"{option} {text} is in the inverse of the body's unit of length"
+    if option == "--frequency" and not str(text).strip()[-1:].isalpha():
+        return f"{option} {text} is {frequency_words(hertz)}, give e.g. {text}GHz"
+    return "lengths are metres, of a file in its --units"

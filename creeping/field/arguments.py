@@ -13,6 +13,7 @@ from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.creeping_modes import fock_scale
 from creeping.geometry.arguments import positive_number, real_array, shown
+from creeping.geometry.checks import unit_of
 from creeping.geometry.directions import unit_directions
 from creeping.geometry.evaluators import speed_of
 from creeping.geometry.piecewise import checked_smooth, has_edges
@@ -20,6 +21,9 @@ from creeping.geometry.surface import Surface
 from creeping.rays.quantities import RayPoints
 
 LEAST_WAVENUMBER, LARGEST_WAVENUMBER = 1e-100, 1e100
+ACROSS = (3e-4, 1e6)
+"""Wavelengths across of bodies that have a field. Below, the equation loses it: f of a sphere is within 1.1 % at 3e-4,
+and 100, 20 and 33 % off at 3e-5, soft, rigid and conducting. Above, 1e-6 of the size is a wavelength: rays err so."""
 METHODS = ("auto", "currents", "rays", "equation")
 PLAIN = ("auto", "equation")
 """Methods of fields on the body, and of conductors."""
@@ -55,11 +59,48 @@ def checked_plain(body: Surface, *, smooth: str = "", edgeless: str = "") -> Non
         checked_smooth(body, smooth or edgeless, "its far field is known, by creeping.far_field")
 
 
-def checked(wavenumber: float, order: int) -> float:
-    """The wavenumber, if it and the order are usable."""
+def wavelengths_across(body: Surface, wavenumber: float) -> float:
+    """Longest side of the body's box in wavelengths.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> round(wavelengths_across(sc.Sphere(0.15), 209.585), 3)
+    10.007
+    """
+    return float(np.max(np.ptp(np.asarray(body.bounds, dtype=float), axis=0))) * wavenumber / (2 * np.pi)
+
+
+def checked_across(body: Surface, *wavenumbers: float) -> None:
+    """Refuse a body that is absurdly small or large in wavelengths: a unit was forgotten.
+
+    Raises
+    ------
+    InvalidInputError
+        With its size in wavelengths as ``across``.
+    """
+    for k in wavenumbers:
+        across = wavelengths_across(body, k)
+        if not ACROSS[0] <= across <= ACROSS[1]:
+            unit = unit_of(body)
+            raise InvalidInputError(
+                f"the body is {across:.2g} wavelengths across ({2 * np.pi * across / k:.4g} {unit} at wavenumber "
+                f"{k:.4g}/{unit}), {'more' if across > 1 else 'fewer'} than any field here is known for, {ACROSS[0]:g} "
+                f"to {ACROSS[1]:g}; give k in 1/{unit}: creeping.wavenumber('10 GHz') for a body in metres",
+                across=across,
+            )
+
+
+def checked(wavenumber: float, order: int, body: Surface | None = None) -> float:
+    """The wavenumber, if it and the order are usable, and the body, if given, not absurdly small or large at it."""
+    given: Any = wavenumber
+    if isinstance(given, str):
+        raise InvalidInputError(
+            f"wavenumber = {given!r} is text; give creeping.wavenumber({given!r}), in 1/m, of a body in "
+            "metres; of sound with its sound_speed="
+        )
     if isinstance(wavenumber, complex | np.complexfloating):
         raise InvalidInputError(f"wavenumber = {wavenumber!r} is complex; give a real one: losses belong to the medium")
-    given: Any = wavenumber
     if isinstance(given, list | tuple) or (isinstance(given, np.ndarray) and given.ndim):
         raise InvalidInputError(
             f"wavenumber = {shown(wavenumber)} is not one number; for several frequencies call "
@@ -70,6 +111,8 @@ def checked(wavenumber: float, order: int) -> float:
         raise InvalidInputError(f"wavenumber = {k:g} has squares that are no numbers; take another unit of length")
     if isinstance(order, bool) or not isinstance(order, int | np.integer) or order not in (1, 2):
         raise InvalidInputError(f"order = {order!r} is neither 1 nor 2")
+    if body is not None:
+        checked_across(body, k)
     return k
 
 

@@ -96,7 +96,7 @@ def surface_currents(
     one_of(fan, "fan", RayFan, "creeping.launch")
     kinds = scalar_boundaries(boundary)
     checked_plain(fan.body)
-    k = checked(wavenumber, 2)
+    k = checked(wavenumber, 2, fan.body)
     problem = fan.body, fan.line.direction, k, boundary
     if solve:
         return _of_line(fan, asked_solution(*problem))

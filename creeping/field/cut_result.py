@@ -370,7 +370,7 @@ def _checked(fan: RayFan, wavenumber: float, boundary: BoundaryLike, order: int,
     one_of(fan, "fan", RayFan, "creeping.launch")
     checked_plain(fan.body)
     conductor = isinstance(boundary, str) and boundary == "pec"
-    k = checked(wavenumber, order)
+    k = checked(wavenumber, order, fan.body)
     if conductor and (order != 2 or method not in PLAIN):
         raise InvalidInputError("a conductor's field has order 2 and method 'auto' or 'equation'")
     return k, conductor

@@ -101,9 +101,10 @@ class Echo(Drawn):
 
     def __repr__(self) -> str:
         told = self.summary()
+        kind = "pec" if self.quantity == "rcs" else self.channels[0]
         tops = ", ".join(f"{c} up to {'none' if v is None else f'{v:.1f}'}" for c, v in told["largest"].items())
         return (
-            f"Echo({told['quantity']}, {told['angles']} angles x {told['frequencies']} frequencies)\n"
+            f"Echo({told['quantity']}, {kind}, {told['angles']} angles x {told['frequencies']} frequencies)\n"
             f"  {tops} {told['unit']}; {told['unresolved']} of {told['values']} values unresolved"
         )
 
@@ -114,8 +115,9 @@ class Echo(Drawn):
 
     @property
     def hertz(self) -> FloatArray:
-        """Frequencies (k,), Hz."""
-        return np.asarray(frequency(self.wavenumbers, sound_speed=self.sound_speed))
+        """Frequencies (k,), Hz, to 14 digits: what wavenumbers and ranges round is the digit behind them."""
+        found = np.atleast_1d(frequency(self.wavenumbers, sound_speed=self.sound_speed))
+        return np.array([float(f"{value:.14g}") for value in found])
 
     @property
     def level_name(self) -> tuple[str, str]:

@@ -117,7 +117,7 @@ def far_field(
     one_of(fan, "fan", RayFan, "creeping.launch")
     checked_plain(fan.body)
     kinds = scalar_boundaries(boundary)
-    k = checked(wavenumber, order)
+    k = checked(wavenumber, order, fan.body)
     checked_method(method, order)
     r = observers_of(observation)
     piecewise, solve = is_piecewise(fan.body), True if method == "equation" else None

@@ -129,7 +129,7 @@ def near_field(
     """
     one_of(fan, "fan", RayFan, "creeping.launch")
     kind = scalar_boundary(boundary)
-    k = checked(wavenumber, order)
+    k = checked(wavenumber, order, fan.body)
     checked_method(method, order)
     checked_plain(fan.body, edgeless="the near field by rays" if method == "rays" or order == 1 else "")
     y = as_points(points)

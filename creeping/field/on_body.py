@@ -129,7 +129,7 @@ def surface_field(
     one_of(fan, "fan", RayFan, "creeping.launch")
     checked_plain(fan.body)
     kind = scalar_boundary(boundary)
-    k = checked(wavenumber, order)
+    k = checked(wavenumber, order, fan.body)
     checked_method(method, order, PLAIN)
     if points is None:
         if method == "equation":

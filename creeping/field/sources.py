@@ -170,7 +170,7 @@ def source_pattern(
     """
     checked_plain(flow.body, smooth="the far field of sources near a body")
     scalar_boundary(boundary)
-    k = checked(wavenumber, 2)
+    k = checked(wavenumber, 2, flow.body)
     x = as_points(sources).reshape(-1, 3)
     r = observers_of(directions)
     if not len(x):

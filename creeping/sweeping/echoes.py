@@ -13,7 +13,7 @@ import numpy as np
 
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError, SingularIncidenceError
-from creeping.field.arguments import checked, checked_method, checked_plain
+from creeping.field.arguments import checked, checked_across, checked_method, checked_plain
 from creeping.field.body_currents import expected_seconds
 from creeping.field.boundary import BoundaryLike
 from creeping.field.echo import Echo
@@ -176,6 +176,15 @@ def seconds_of_currents(
     return len(azimuths) * expected_seconds(fan, wavenumbers, observers, boundary)
 
 
+def monostatic_method(body: Surface, wavenumbers: FloatArray, boundary: BoundaryLike, incidences: int) -> str:
+    """What "auto" is in backscatter: "t-matrix" where the equation would be solved for each incidence and takes longer.
+
+    ``wavenumbers`` (k,), 1/L.
+    """
+    solved = why_no_rays(body) or is_piecewise(body)
+    return "t-matrix" if solved and all(pays(body, k, boundary, incidences) for k in wavenumbers) else "auto"
+
+
 def _angles(azimuth: ArrayLike, elevation: ArrayLike) -> tuple[FloatArray, FloatArray]:
     try:
         given = real_array(azimuth, "azimuths"), real_array(elevation, "elevations")
@@ -186,6 +195,11 @@ def _angles(azimuth: ArrayLike, elevation: ArrayLike) -> tuple[FloatArray, Float
         raise InvalidInputError(
             f"azimuth and elevation of shape {a.shape} are not one or more finite angles in degrees"
         )
+    for name, angles in zip(("azimuth", "elevation"), given, strict=True):
+        turned = np.abs(np.degrees(angles))
+        # none in degrees is within 1e-9 of such a multiple of pi/180 by accident
+        if 1 <= np.max(turned, initial=0) < 361 and np.all(np.abs(turned - np.round(turned)) < 1e-9):
+            raise InvalidInputError(f"{name} is in radians, for {turned.max():.0f} degrees at most; give np.degrees")
     if np.any(np.abs(e) > 90):
         raise InvalidInputError(f"elevation {e[np.argmax(np.abs(e))]:g} is not between -90 and 90 degrees")
     return a, e
@@ -209,17 +223,14 @@ def _swept(
     k = np.array([checked(value, 2) for value in numbers.tolist()])
     if k.ndim != 1 or not k.size:
         raise InvalidInputError(f"wavenumbers of shape {numbers.shape} are not one or more numbers")
+    checked_across(body, float(k.min()), float(k.max()))
     if len(np.unique(k)) < len(k):
         raise InvalidInputError("wavenumbers repeat themselves")
     count = len(incidences) * len(k) * len(asked.get("observation", (None,)))
     if count > MOST:
         raise InvalidInputError(f"{count} values are asked for at once; {MOST} are the most: give a coarser step")
-    if asked["method"] == "auto" and (why_no_rays(body) or is_piecewise(body)):
-        # where the equation would be solved for each incidence
-        several = asked["quantity"] == "monostatic" and all(
-            pays(body, number, asked["boundary"], len(incidences)) for number in k
-        )
-        asked["method"] = "t-matrix" if several else "auto"
+    if asked["method"] == "auto" and asked["quantity"] == "monostatic":
+        asked["method"] = monostatic_method(body, k, asked["boundary"], len(incidences))
     if why_no_rays(body) or asked["method"] == "t-matrix":
         return sweep_directions(body, incidences, wavenumbers=k, progress=progress, **asked)
     length = body_length(body, float(k.min()))

@@ -11,7 +11,7 @@ import numpy as np
 
 from creeping._typing import Any, ArrayLike, FloatArray, IntArray
 from creeping.errors import InvalidInputError
-from creeping.field.arguments import checked
+from creeping.field.arguments import checked, checked_across
 from creeping.field.boundary import BoundaryLike, boundary_name, parse_boundary
 from creeping.geometry.arguments import real_array
 from creeping.geometry.directions import unit_directions
@@ -286,6 +286,8 @@ def sweep_request(
         With all mistakes at once, as ``mistakes`` too.
     """
     several = boundary if isinstance(boundary, (list, tuple)) else (boundary,)
+    if isinstance(wavenumbers, str):
+        checked(wavenumbers, 2)  # type: ignore[arg-type]
     given = np.atleast_1d(real_array(wavenumbers, "wavenumbers"))
     if given.ndim > 1 or given.size > MOST_WAVENUMBERS:
         raise InvalidInputError(f"wavenumbers have shape {given.shape}; give a number or at most {MOST_WAVENUMBERS}")
@@ -322,18 +324,20 @@ def sweep_length(body: Surface, length: float | Literal["auto"], wavenumbers: Ar
 
     An automatic length is one of whole leaps of a map, each of ``leap``, for what is left of one would be traced. What
     is no number is returned, no wavenumber left out, for `sweep_request` to name it with all other mistakes. A body
-    without rays has none of any length.
+    without rays has none of any length; one that is absurdly small or large in wavelengths is refused.
     """
-    if why_no_rays(body):
-        return 1.0
-    if not (isinstance(length, str) and length == AUTO):
-        number = isinstance(length, (int, float)) and not isinstance(length, bool) and 0 < length <= LARGEST_LENGTH
-        return asked_length(body, float(length)) if number else length
     try:
         known = np.atleast_1d(real_array(wavenumbers, "wavenumbers"))
     except InvalidInputError:
         known = np.zeros(0)
     known = known[np.isfinite(known) & (known > 0)]
+    if known.size:
+        checked_across(body, float(known.min()), float(known.max()))
+    if why_no_rays(body):
+        return 1.0
+    if not (isinstance(length, str) and length == AUTO):
+        number = isinstance(length, (int, float)) and not isinstance(length, bool) and 0 < length <= LARGEST_LENGTH
+        return asked_length(body, float(length)) if number else length
     found = body_length(body, None if speed_of(body) is not None or not known.size else float(known.min()))
     return leap * float(np.ceil(found / leap - 1e-9)) if 0 < leap < LONG_LEAP * found else found
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from scatterers.kernels.compiled import Compiled
 from scatterers.kernels.tensor import CENTRE, HEADER
+from scatterers.shown import Shown
 from scatterers.sphere_map.radial import RadialMap, SpaceLevel
 from scatterers.sphere_map.star import CubeSphereAtlas, FaceChart
 from scatterers.spline.cloud import Samples
@@ -78,7 +79,7 @@ def numbers(values: ArrayLike) -> NDArray[np.float64]:
         raise ValueError(str(error)) from None
 
 
-class Body:
+class Body(Shown):
     """Base of the dataclass bodies; each lists its parameters as fields, ``speed`` last.
 
     ``creases`` are the edges, joints, seams and tips of a body of smooth pieces.

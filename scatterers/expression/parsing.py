@@ -57,6 +57,18 @@ class Differentiated(NamedTuple):
     first: Callable[..., tuple[float, float, float, float]]
 
 
+def one_sided(text: str) -> str:
+    """An equation as the expression that is 0 on it, left minus right; other texts as they are.
+
+    Examples
+    --------
+    >>> one_sided("x**2 + y**2 + z**2 = 1")
+    '(x**2 + y**2 + z**2) - (1)'
+    """
+    sides = re.split("(?<![<>=!])={1,2}(?!=)", text) if isinstance(text, str) else []
+    return f"({sides[0].strip()}) - ({sides[1].strip()})" if len(sides) == 2 else text
+
+
 def parse(text: str) -> Any:
     """Turn the text into a sympy expression of x, y, z.
 

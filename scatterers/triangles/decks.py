@@ -1,4 +1,4 @@
-r"""Triangles of a mesh of finite elements: Gmsh's MSH (text, 2 and 4.1) and the bulk data of NASTRAN.
+r"""Triangles of a mesh of finite elements: Gmsh's MSH (text, 2 and 4.1), Medit's text, the bulk data of NASTRAN.
 
 Quadrangles are two triangles each. Points, lines and volumes are no surface, and left out.
 
@@ -23,7 +23,7 @@ CURVED = (9, 10, 16, 20, 21, 23, 25)
 """Kinds of those with nodes along their edges."""
 CARDS = {"CTRIA3": 3, "CTRIAR": 3, "CQUAD4": 4, "CQUADR": 4}
 CURVED_CARDS = ("CTRIA6", "CQUAD8", "CQUAD")
-SUFFIXES = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf", ".msh", ".bdf")
+SUFFIXES = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf", ".msh", ".bdf", ".mesh")
 """Endings of names of files that are read, beside .nas, which is .bdf, and .gz."""
 MESHES = {
     ".ply": rb"ply[ \t]*[\r\n]",
@@ -31,6 +31,7 @@ MESHES = {
     ".off": rb"\s*(ST)?C?N?4?OFF\b",
     ".stl": rb"\s*(?i:solid)\b(?s:.*?)\bfacet\b",
     ".msh": rb"\s*\$(MeshFormat|Comments)\b",
+    ".mesh": rb"\s*(#.*\s*)*MeshVersionFormatted\b",
     ".obj": rb"(?s:.*[\r\n])??[ \t]*v[ \t]+[-+.\d]",
     ".bdf": rb"(?s:.*[\r\n])??(BEGIN BULK|GRID\b)",
 }
@@ -46,8 +47,8 @@ OTHERS = {
     rb"%PDF": "a PDF document; export the body as a mesh",
     rb"(\x89PNG|\xff\xd8\xff|GIF8|II\*\0|MM\0\*)": "a picture; export the body as a mesh",
     rb"\x89HDF": "an HDF5 file; export the body as a mesh",
-    rb"# vtk DataFile": "a VTK file; export the body as a mesh",
-    rb"\s*<(\?xml|COLLADA|VTKFile)": "an XML file; export the body as a mesh",
+    rb"(# vtk DataFile|\s*(<\?xml[^>]*>\s*)?<VTKFile)": "a VTK file; save its surface as STL",
+    rb"\s*<(\?xml|COLLADA)": "an XML file; export the body as a mesh",
     rb"\s*\{": "a JSON file, such as glTF in parts; export the body as .glb",
 }
 """Beginnings of files that are no meshes that are read, what they are, and what to do."""
@@ -112,6 +113,38 @@ def read_msh(data: bytes) -> Read:
                 raise ValueError("it has curved elements, where those of order 1 alone are read")
             faces += _split([int(word) for word in row[-CORNERS[kind] :]]) if kind in CORNERS else []
     return _numbered(numbers, places, faces)
+
+
+def read_medit(data: bytes) -> Read:
+    r"""Vertices (n, 3) and triangles (m, 3) of a text of Medit, a .mesh file.
+
+    Raises
+    ------
+    ValueError
+        If it is not of three dimensions, has curved elements, or is broken.
+
+    Examples
+    --------
+    >>> points = b"Vertices 3\n0 0 0 1\n1 0 0 1\n0 1 0 1\n"
+    >>> read_medit(b"MeshVersionFormatted 2 Dimension 3\n" + points + b"Triangles 1\n1 2 3 0\nEnd\n")[1]
+    array([[0, 1, 2]])
+    """
+    parts = dict(re.findall(rb"([A-Z]\w*)((?:\s+[-+.\d][-+.\deE]*)*)", re.sub(rb"#.*", b"", data)))
+    if parts.get(b"Dimension", b"").split() != [b"3"]:
+        raise ValueError("it does not state three dimensions")
+    if any(name.startswith((b"TrianglesP", b"QuadrilateralsQ")) for name in parts):
+        raise ValueError("it has curved elements, where those of order 1 alone are read")
+
+    def table(name: bytes, width: int) -> list[list[bytes]]:
+        count, *words = parts.get(name, b"").split() or [b"0"]
+        if len(words) != int(count) * (width + 1):
+            raise ValueError(f"it states {int(count)} {name.decode()} where it has {len(words) / (width + 1):g}")
+        return [words[row : row + width] for row in range(0, len(words), width + 1)]
+
+    places = [[float(word) for word in row] for row in table(b"Vertices", 3)]
+    sides = [row for name, width in ((b"Triangles", 3), (b"Quadrilaterals", 4)) for row in table(name, width)]
+    faces = [face for row in sides for face in _split([int(word) for word in row])]
+    return _numbered([*range(1, len(places) + 1)], places, faces)
 
 
 def _lines(data: bytes) -> Iterator[list[bytes]]:

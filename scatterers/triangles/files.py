@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.triangles.decks import read_bdf, read_msh, understood
+from scatterers.triangles.decks import read_bdf, read_medit, read_msh, understood
 from scatterers.triangles.form import check_whole, uncrossed
 from scatterers.triangles.parts import every_part
 from scatterers.triangles.quality import Choice, silent, whole_body
@@ -24,6 +24,7 @@ from scatterers.triangles.subdivision import Subdivision
 from scatterers.triangles.threemf import read_3mf, with_triangles
 from scatterers.triangles.topology import cleaned, crossings, oriented
 
+DECKS = {".msh": read_msh, ".bdf": read_bdf, ".mesh": read_medit}
 UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "in": 0.0254, "ft": 0.3048, "km": 1e3}
 """Metres per unit."""
 SPELLED = {
@@ -88,7 +89,7 @@ def read_mesh(
     Parameters
     ----------
     source : path, or object with ``vertices`` and ``faces``
-        STL, OBJ, PLY, OFF, GLB, 3MF, MSH or BDF file, packed by gzip or not, or e.g. a trimesh.Trimesh.
+        STL, OBJ, PLY, OFF, GLB, 3MF, MSH, BDF or MESH file, packed by gzip or not, or e.g. a trimesh.Trimesh.
     units : {"m", "mm", "cm", "um", "in", "ft", "km"}, optional
         Unit of the numbers; must be given for files that do not state it. An object's numbers are metres by default.
     choice : Choice, optional
@@ -266,8 +267,8 @@ def _loaded(
     """Vertices and triangles of everything in the file, the unit it states, and its parts: name, triangles."""
     if suffix == ".3mf":
         return read_3mf(data, MOST_BYTES, MOST_TRIANGLES)
-    if suffix in (".msh", ".bdf"):
-        return *(read_msh if suffix == ".msh" else read_bdf)(data), None, ()
+    if suffix in DECKS:
+        return *DECKS[suffix](data), None, ()
     import trimesh
 
     # else all objects of an OBJ file are one part, by the name of the first

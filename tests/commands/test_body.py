@@ -156,10 +156,10 @@ def test_options_of_files_reach_the_body(balls, capsys):
 @pytest.mark.parametrize(
     "options, match",
     [
-        (["--part", 3], "part = 3 is none of balls.off"),
+        (["--part", 3], "--part 3 is none of balls.off"),
         (["--part", "wing"], "no part 'wing'"),
-        (["--cap", -1], "cap = -1.0 is no size in m"),
-        (["--subdivide", 4], "subdivide = 4; give 1, 2 or 3 times"),
+        (["--cap", -1], "--cap -1.0 is no size in m"),
+        (["--subdivide", 4], "--subdivide 4; give 1, 2 or 3 times"),
         (["--sew", 0.1], "--sew does not belong to this body"),
     ],
 )
@@ -171,7 +171,7 @@ def test_bad_options_of_files_are_exit_code_3(balls, options, match, capsys):
 @pytest.mark.parametrize(
     "name, match",
     [
-        ("hull.vtk", "hull.vtk is a VTK file; export the body as a mesh"),
+        ("hull.vtk", "hull.vtk is a VTK file; save its surface as STL"),
         ("hull.step", "hull.step does not begin as STEP files do: it is a VTK file"),
         ("hull", "hull is a VTK file"),
     ],
@@ -186,7 +186,7 @@ def test_what_is_there_is_a_file_whatever_its_name(name, match, tmp_path, capsys
     "body, more, match",
     [
         ("ball", [], "does not state its unit"),
-        ("ball", ["--units", "yard"], "units = 'yard' is none of m, mm"),
+        ("ball", ["--units", "yard"], "--units yard is none of m, mm"),
         ("cube", ["--units", "m", "--strict"], "not smooth enough (sharp)"),
         ("none.stl", ["--units", "m"], "none.stl is no file on this machine"),
         ("none.xyz", [], "unknown body 'none.xyz'"),

@@ -8,8 +8,8 @@ import pytest
 import shared_bodies as sc
 from command_line import ran, table
 
-from creeping.commands.echo import _cost
 from creeping.commands.echo_report import echo_request
+from creeping.commands.forecast import forecast
 from creeping.errors import InvalidInputError
 
 
@@ -22,8 +22,11 @@ def test_band_of_a_sphere_with_a_comparison(tmp_path, capsys):
     out = tmp_path / "out"
     words = ["sphere:radius=0.15", "--frequency", "8:10.4:0.15GHz", "--compare", given, "-o", out]
     assert ran("rcs", *words, "--no-cache") == 0
-    said = capsys.readouterr().out
+    said, told = capsys.readouterr()
     assert "VV against the reference at 3 places" in said and "range profile" in said
+    # 0.3 m in wavelengths of 3.75 to 2.88 cm
+    assert "0.3 m, 8.01 to 10.4 wavelengths across, perfect conductor" in told and "creeping rays and surface" in told
+    assert "cross section of sphere:radius=0.15, perfect conductor, dBsm" in said.splitlines()[0]
     summary = json.loads((out / "summary.json").read_text())
     assert summary["values"] == 34 and summary["unresolved"] == 0
     assert summary["compared"]["VV"]["rms_db"] < 0.3
@@ -39,6 +42,7 @@ def test_map_of_target_strength_without_pictures(tmp_path, capsys):
     summary = json.loads(capsys.readouterr().out)
     assert summary["unit"] == "dB re 1 m" and summary["files"] == ["ts.csv", "ts.mat", "summary.json"]
     rows = table(tmp_path / "ts.csv")
+    assert {row["frequency_hz"] for row in rows} == {"200000.0", "220000.0"}
     assert len(rows) == 6 and {row["azimuth_deg"] for row in rows} == {"0.0", "10.0", "20.0"}
     # sqrt(rho1 rho2)/2 at the nose: b c/a/2
     assert float(rows[0]["level_db"]) == pytest.approx(20 * np.log10(0.05 * 0.04 / 0.06 / 2), abs=1.0)
@@ -56,7 +60,7 @@ GOOD = NONE | {"frequency": "10GHz", "boundary": "pec"}
         {"polarisation": "HH,HH"},
         {"polarisation": "HH", "boundary": "soft"},
         {"monostatic": "az", "bistatic": "el"},
-        *({"monostatic": text} for text in ("round", "az:5:3:1", "el:-100:0:1")),
+        *({"monostatic": text} for text in ("round", "az:5:3:1", "el:-100:0:1", "el:95", "az:1,az:2", "az:1:2")),
         {"incidence": "0,95"},
     ],
     ids=str,
@@ -106,14 +110,50 @@ def test_azimuths_of_another_turn_are_compared_and_polar_angles_are_not(tmp_path
 
 
 def test_what_may_take_minutes_is_told_before():
-    """Of a slender body over a band, and not of a few values, nor of those that rays alone compute."""
+    """Of a slender body over a band, and not of rays alone."""
     fish = sc.Ellipsoid(0.07, 0.007, 0.007)
-    asked = NONE | {"sound_speed": 1477.0, "boundary": "soft"}
-    band = echo_request("ts", **asked | {"frequency": "38:200:2kHz", "monostatic": "az:2"})
-    at = band.angles(fish)
-    words = _cost(fish, band, *at, "auto")
+    asked = NONE | {"sound_speed": 1477.0, "boundary": "soft", "frequency": "38:200:2kHz", "monostatic": "az:0:360:2"}
+    band = echo_request("ts", **asked)
+    radar = band.angles(fish)
+    told = forecast(fish, band.wavenumbers, "soft", radar=radar, metres=True)
     # a run of it took 75 minutes
-    assert 40 <= int(re.search(r"about (\d+) min", words)[1]) <= 160 and "--method rays" in words
-    assert _cost(fish, band, *at, "rays") == ""
-    few = echo_request("ts", **asked | {"frequency": "38kHz", "monostatic": "az:30"})
-    assert _cost(fish, few, *few.angles(fish), "auto") == ""
+    assert 40 <= 60 * float(re.search(r"up to about ([\d.]+) h", told.by)[1]) <= 160
+    assert re.search(r"0\.14 m, 3.6 to 19 wavelengths across$", told.body)
+    assert "rays alone, in seconds" in forecast(fish, band.wavenumbers, "soft", radar=radar, method="rays").by
+
+
+@pytest.mark.parametrize(
+    ("words", "azimuths", "elevations"),
+    [
+        ({"monostatic": "az:20"}, [20], [0]),
+        ({"monostatic": "az:20,el:5"}, [20], [5]),
+        ({"monostatic": "el:5", "incidence": "30,0"}, [30], [5]),
+        ({"bistatic": "az:20", "incidence": "30,5"}, [20], [5]),
+        ({"monostatic": "az:0:20:10"}, [0, 10, 20], [0, 0, 0]),
+    ],
+)
+def test_one_direction_is_one(words, azimuths, elevations):
+    request = echo_request("rcs", **(GOOD | words))
+    found = request.angles(sc.Sphere())
+    assert [list(angles) for angles in found] == [azimuths, elevations]
+    if "incidence" in words and "bistatic" in words:
+        assert request.incidence == (30, 5)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ("rcs sphere --frequency 10", "2 m, 6.67e-08 wavelengths across, too small.*--frequency 10 is 10 Hz"),
+        ("rcs sphere:radius=150 --frequency 10GHz", "300 m, 1e[+]04 wavelengths across.*lengths are metres"),
+        ("rcs sphere --frequency 1000THz --monostatic az:1", "too large for any field; lengths are metres"),
+        ("ts sphere --frequency 38kHz --sound-speed 1.5", "--sound-speed 1.5 m/s is slower.*give 1500"),
+        ("run sphere --frequency 10 --direction 1 0 0 -o x", "too small for any field"),
+        ("check sphere --wavenumber 1e-6", "too small for any field; --wavenumber 1e-06"),
+        ("rcs equation:x**2+y**2+z**2-1 --frequency 1GHz", "give the expression or equation alone: 'x"),
+        ("rcs spher --frequency 1GHz", "did you mean sphere"),
+        ("figure fig6", "did you mean fig6-creeping or fig6-torus"),
+    ],
+)
+def test_what_cannot_be_meant_names_the_cure(arguments, words, capsys):
+    assert ran(*arguments.split()) == 3
+    assert re.search(words, capsys.readouterr().err)

@@ -20,7 +20,9 @@ def test_a_frequency_is_in_metres_and_dbsm(tmp_path, capsys):
     options = ["--direction", 0, 0, 1, "--flow", "direct", "--rays", 32, "--length", "0.5", "--no-pictures"]
     field = ["--frequency", "6GHz", "--boundary", "pec", "--observe", "backscatter", "--observe", "cut:0:90"]
     assert ran("run", "sphere:radius=0.15", *options, *field, "-o", tmp_path) == 0
-    said = capsys.readouterr().out
+    said, told = capsys.readouterr()
+    assert "0.3 m, 6 wavelengths across" in told and "perfect conductor: far field by" in told
+    assert said.startswith("sphere:radius=0.15, perfect conductor, d =")
     assert "6 GHz, k = 125.751" in said and "dBsm" in said and "no pictures" in said
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert not [name for name in summary["files"] if name.endswith(".png")]

@@ -162,3 +162,55 @@ def test_bodies_refuse_as_well():
     ):
         with pytest.raises(ValueError, match=match):
             make()
+
+
+@pytest.mark.parametrize(
+    ("ask", "words"),
+    [
+        (lambda: cr.backscatter(BODY, wavenumbers=cr.wavenumber(10)), "8e-08 wavelengths.*0.0003 to 1e[+]06"),
+        (lambda: cr.solve(BODY, (1, 0, 0), wavenumber=1e8, boundary="pec"), "more than any field"),
+        (lambda: cr.t_matrix(BODY, wavenumber="10 GHz", boundary="pec"), "give creeping.wavenumber.'10 GHz'"),
+        (lambda: cr.sweep_directions(FLOW, [P[0]], quantity="monostatic", wavenumbers=[1, 1e8]), "3.8e[+]07 wavelen"),
+        (lambda: cr.backscatter(BODY, wavenumbers=9, azimuth=np.linspace(0, 2 * np.pi, 73)), "for 360 degrees at most"),
+        (lambda: cr.bistatic(BODY, wavenumbers=9, elevation=np.radians([0, 45])), "elevation is in radians"),
+        (lambda: cr.wavenumber("38 kHz", sound_speed=1.5), "of 1.5 km/s give 1500"),
+    ],
+)
+def test_a_forgotten_unit_is_told_of(ask, words):
+    with pytest.raises(cr.InvalidInputError, match=words):
+        ask()
+
+
+def test_small_angles_in_degrees_are_taken():
+    """Whole degrees as radians have no exact digits: 0, 1e-12 and 3.14 are degrees."""
+    from creeping.sweeping.echoes import _angles
+
+    for angles in ([0.0], [1e-12, 0.0], [3.14], [0.5, 1.0]):
+        assert _angles(angles, 0.0)[0].tolist() == angles
+
+
+@pytest.mark.parametrize(
+    ("package", "name", "words"),
+    [
+        (cr, "backscater", "did you mean backscatter?"),
+        (cr, "farfield", "did you mean far_field or"),
+        (cr, "rcs", "it is creeping.backscatter"),
+        (cr, "target_strength", "field.target_strength"),
+        (cr, "Sphere", "import scatterers as sc, then sc.Sphere"),
+        (sc, "Spere", "did you mean Sphere"),
+        (sc, "Box", "it has Almond"),
+    ],
+)
+def test_a_name_that_is_none_leads_to_one_that_is(package, name, words):
+    with pytest.raises(AttributeError, match=words):
+        getattr(package, name)
+
+
+def test_what_a_guessed_name_leads_to_works():
+    """The texts are calls: on a sphere pi radius^2, and radius/2, within half a decibel."""
+    for name, far in (("rcs", np.pi * 0.15**2), ("target_strength", 0.15**2 / 4)):
+        with pytest.raises(AttributeError) as told:
+            getattr(cr, name)
+        call = str(told.value).partition("it is ")[2]
+        found = eval(call, {"creeping": cr, "body": sc.Sphere(0.15)})
+        assert float(np.ravel(found)[0]) == pytest.approx(10 * np.log10(far), abs=0.5)

@@ -26,7 +26,7 @@ HOSTILE = {
     "nested calls": "sin(" * 130 + "x" + ")" * 130,
 }
 NOT_VALID = {
-    "statement": "x = 1",
+    "statement": "x = y = 1",
     "deep brackets": "(" * 500 + "x" + ")" * 500,
     "caret in words": "x squared",
 }

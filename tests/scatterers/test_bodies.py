@@ -92,3 +92,16 @@ def test_fingerprint_tells_bodies_apart():
     prints = {b.fingerprint for b in (sc.Sphere(), sc.Sphere(2.0), sc.Ellipsoid(1, 1, 1), sc.Sphere(speed="1 + x"))}
     assert len(prints) == 4
     assert sc.Sphere(1).fingerprint == sc.Sphere(1.0).fingerprint
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        (sc.Cylinder(1.0, 3.0), ["Cylinder", "2 x 2 x 3 L", "any unit", "2 edges, joints or tips"]),
+        (sc.Bodies([sc.Sphere(), sc.Sphere()], at=[[0, 0, 0], [4, 0, 0]]), ["Bodies", "6 x 2 x 2 L", "none: "]),
+        (sc.Implicit("x**2 + y**2 + z**2 = 1"), ["(x**2 + y**2 + z**2) - (1)", "Implicit"]),
+    ],
+)
+def test_a_body_shows_itself_in_notebooks(body, words):
+    table = body._repr_html_()
+    assert all(word in table for word in words) and table.startswith("<table>")

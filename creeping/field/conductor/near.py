@@ -221,7 +221,7 @@ def _checked(
     one_of(fan, "fan", RayFan, "creeping.launch")
     checked_plain(fan.body)
     checked_method(method, 2, PLAIN)
-    return checked(wavenumber, 2), incident_mix(polarisation, fan.line.direction)
+    return checked(wavenumber, 2, fan.body), incident_mix(polarisation, fan.line.direction)
 
 
 def _places(count: int, mix: ComplexArray) -> int:

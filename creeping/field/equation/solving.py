@@ -105,7 +105,7 @@ def solve(
     """
     checked_plain(body)
     kinds = scalar_boundaries(boundary)
-    k = checked(wavenumber, 2)
+    k = checked(wavenumber, 2, body)
     d = unit_directions(directions, "directions of incidence").reshape(-1, 3)
     tell = progress or (lambda words: None)
     kind = CONDUCTOR if len(kinds) == 2 else kinds[0]
@@ -196,7 +196,7 @@ def solve_together(body: Surface, directions: FloatArray, wavenumber: float, bou
 
 
 class Plan(NamedTuple):
-    """Nodes, seconds and bytes that the equation of one incidence takes, about; why it is not solved, or nothing."""
+    """Nodes, seconds and bytes that the equation takes, about; why it is not solved, or nothing."""
 
     nodes: int
     seconds: float
@@ -204,8 +204,10 @@ class Plan(NamedTuple):
     refused: str
 
 
-def plan_of(body: Surface, wavenumber: float, boundary: BoundaryLike, seconds: float = SECONDS) -> Plan:
-    """What the equation of one incidence takes, and whether that is too much time or memory, or cannot be."""
+def plan_of(
+    body: Surface, wavenumber: float, boundary: BoundaryLike, seconds: float = SECONDS, *, incidences: int = 1
+) -> Plan:
+    """What the equation takes, and whether that of one incidence is too much time or memory, or cannot be."""
     kind = _kind(boundary)
     try:
         nodes = _nodes(body, wavenumber, kind)
@@ -215,6 +217,8 @@ def plan_of(body: Surface, wavenumber: float, boundary: BoundaryLike, seconds: f
     refused = f"{nodes} nodes take {memory / 1e9:.2g} GB" if memory > budget() else ""
     if takes > seconds:
         refused = f"{nodes} nodes take about {takes:.2g} s, more than {seconds:g}"
+    if incidences > 1:
+        takes, memory = cost(nodes, kind, incidences)
     return Plan(nodes, takes, memory, refused)
 
 

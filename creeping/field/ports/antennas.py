@@ -113,7 +113,7 @@ def antenna_coupling(
     """
     checked_body(body)
     checked_plain(body, smooth="the coupling of antennas")
-    k = checked(wavenumber, order)
+    k = checked(wavenumber, order, body)
     parts = [as_points(given) for given in (slots, monopoles)]
     shapes = [part.shape for part in parts]
     if any(part.ndim != 2 or not len(part) for part in parts):
@@ -197,7 +197,7 @@ def monopole_coupling(
     """
     checked_body(body)
     checked_plain(body, smooth="the coupling of monopoles")
-    k = checked(wavenumber, order)
+    k = checked(wavenumber, order, body)
     rays = port_geodesics(body, ports, k, length)
     return coupled(rays, monopole_sources(rays, k, order), k, "pec", order, "monopole")
 
@@ -274,7 +274,7 @@ def slot_coupling(
     """
     checked_body(body)
     checked_plain(body, smooth="the coupling of slots")
-    k = checked(wavenumber, order)
+    k = checked(wavenumber, order, body)
     rays = port_geodesics(body, ports, k, length)
     along = tangential(axes, rays.normals)
     return coupled(rays, slot_sources(rays, along, k, order), k, "pec", order, "slot", along)

@@ -332,7 +332,7 @@ def checked_wave(body: Surface, wavenumber: float, boundary: BoundaryLike, order
     """The wavenumber, if coupling is known on the body at it, with the boundary and to the order."""
     checked_body(body)
     checked_plain(body, smooth="the coupling of ports")
-    k = checked(wavenumber, order)
+    k = checked(wavenumber, order, body)
     if scalar_boundaries(boundary)[0].kind != "hard" or boundary == "pec":
         raise InvalidInputError(
             f"boundary = {boundary_name(boundary)!r}: coupling is known on hard bodies only; give 'hard', or use "

@@ -28,7 +28,7 @@ from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, boundary_
 from creeping.field.equation.body_tiles import body_tiles
 from creeping.field.equation.currents import inside_points
 from creeping.field.equation.matrix import EACH, VECTOR, Matrix
-from creeping.field.equation.solving import PER_NODE, PRODUCTS, SUM, SUM_VECTOR, cost, plan_of
+from creeping.field.equation.solving import PER_NODE, PRODUCTS, SUM, SUM_VECTOR, plan_of
 from creeping.field.tmatrix.mirrors import mirrors_of, no_mirrors
 from creeping.field.tmatrix.result import TMatrix
 from creeping.field.tmatrix.solved_waves import SolvedWaves
@@ -105,7 +105,7 @@ def t_matrix(
     """
     checked_plain(body)
     kinds = scalar_boundaries(boundary)
-    k = checked(wavenumber, 2)
+    k = checked(wavenumber, 2, body)
     tell = progress or (lambda words: None)
     kind = CONDUCTOR if len(kinds) == 2 else kinds[0]
     tiles = body_tiles(body, FINER * k, kind)
@@ -176,16 +176,19 @@ def plan_for(nodes: int, kind: Boundary, order: int, parts: int = 1) -> Plan:
     return Plan(seconds, 80 * n * waves + 2e4 * n, False)
 
 
-def pays(body: Surface, wavenumber: float, boundary: BoundaryLike, incidences: int) -> bool:
-    """Whether a T-matrix takes less time than the equation of so many incidences, which is not refused."""
-    equation = plan_of(body, wavenumber, boundary)
-    if equation.refused:
-        return False
+def expected(body: Surface, wavenumber: float, boundary: BoundaryLike) -> Plan:
+    """What the T-matrix of a body takes, by the nodes that its equation has."""
     kinds = scalar_boundaries(boundary)
     kind = CONDUCTOR if len(kinds) == 2 else kinds[0]
     radius = 0.5 * float(np.linalg.norm(np.ptp(np.asarray(body.bounds, dtype=float), axis=0)))
-    plan = plan_for(int(FINER**2 * equation.nodes), kind, order_for(wavenumber * radius))
-    return plan.memory <= budget() and plan.seconds < min(SECONDS, cost(equation.nodes, kind, incidences)[0])
+    nodes = plan_of(body, wavenumber, boundary).nodes
+    return plan_for(int(FINER**2 * nodes), kind, order_for(wavenumber * radius))
+
+
+def pays(body: Surface, wavenumber: float, boundary: BoundaryLike, incidences: int) -> bool:
+    """Whether a T-matrix takes less time than the equation of so many incidences, which is not refused."""
+    equation, plan = plan_of(body, wavenumber, boundary, incidences=incidences), expected(body, wavenumber, boundary)
+    return not equation.refused and plan.memory <= budget() and plan.seconds < min(SECONDS, equation.seconds)
 
 
 def _center(body: Surface, center: ArrayLike | None) -> FloatArray:

@@ -208,6 +208,14 @@ def bdf(form):
     return "\n".join([*rows, "ENDDATA"]).encode()
 
 
+def medit():
+    """A text of Medit with a comment, and a volume's tetrahedra, which are no surface."""
+    head = ["MeshVersionFormatted 2 # a ball", "Dimension", "3", f"Vertices {len(VERTICES)}"]
+    rows = [*(f"{x} {y} {z} 0" for x, y, z in VERTICES.tolist()), f"Triangles\n{len(FACES)}"]
+    rows += [f"{a} {b} {c} 7" for a, b, c in (FACES + 1).tolist()]
+    return "\n".join([*head, *rows, "Tetrahedra", "1", "1 2 3 4 0", "End", ""]).encode()
+
+
 STL, ASCII, PLY, OFF, GLB, OBJ = (plain(kind) for kind in ("stl", "stl_ascii", "ply", "off", "glb", "obj"))
 TEXTS = {"stl": ASCII, "obj": OBJ, "off": OFF, "ply": plain("ply", encoding="ascii")}
 ENCODED = {
@@ -230,6 +238,8 @@ ODD_FILES = {
     "lines that go on": ("a.obj", OBJ.replace(b"f ", b"f \\\n"), None),
     "packed": ("a.stl.gz", gzip.compress(ASCII[:9000]) + gzip.compress(ASCII[9000:]), None),
     **{f"Gmsh {version}": ("a.msh", msh(version), None) for version in (2.2, 4.1)},
+    "Medit": ("a.mesh", medit(), None),
+    "Medit, packed": ("a.mesh.gz", gzip.compress(medit()), None),
     **{f"NASTRAN {form}": ("a.bdf", bdf(form), None) for form in ("commas", "small", "large")},
 }
 
@@ -329,6 +339,9 @@ BAD_FILES = {
     "cut msh": (written("a.msh", msh(2.2)[:-99]), "a.msh cannot be read as MSH: it lacks its nodes or elements"),
     "short msh": (written("a.msh", msh(2.2).replace(b"\n162\n", b"\n99999999999\n")), "states 99999999999 rows"),
     "binary msh": (written("a.msh", b"$MeshFormat\n2.2 1 8\n"), "no text of Gmsh's versions 2.2 or 4.1"),
+    "short mesh": (written("a.mesh", medit().replace(b"s 162", b"s 163")), "states 163 Vertices where it has 162"),
+    "flat mesh": (written("a.mesh", "MeshVersionFormatted 2\nDimension 2\n"), "does not state three dimensions"),
+    "vtk": (written("a.vtu", '<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid">'), "save its surface as STL"),
     "coordinates": (written("a.bdf", "GRID,1,3,0.,0.,0.\n"), "node 1 is in the coordinates 3"),
     "no node": (written("a.bdf", "GRID,1,,0.,0.,0.\nCTRIA3,1,1,1,1,7\n"), "node 7, which it does not hold"),
     "no number": (written("a.bdf", "GRID,1,,a,0.,0.\n"), "GRID 1 has a field that is no number"),

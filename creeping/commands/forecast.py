@@ -1,0 +1,179 @@
+"""What a field will be made by, how long that takes and how far it errs, told before. Part of the command line."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from creeping._typing import ArrayLike, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.field.arguments import checked_across
+from creeping.field.boundary import BoundaryLike, boundary_name
+from creeping.field.equation.solving import ASKED, SECONDS, is_large, plan_of
+from creeping.field.tmatrix.computing import expected
+from creeping.field.validity_range import EDGE, body_validity
+from creeping.geodesics.equations import points_of_charts
+from creeping.geometry.checks import unit_of
+from creeping.geometry.directions import azimuth_elevation_of
+from creeping.geometry.parts import why_no_rays
+from creeping.geometry.piecewise import has_edges, is_piecewise
+from creeping.sweeping.echoes import seconds_of_currents
+
+SMALL, LARGE = 0.03, 3e3
+"""Wavelengths across beyond which a unit is asked about: a thousandth of 30, and a thousand times 3."""
+KINDS = {"soft": "soft (pressure release)", "hard": "hard (rigid)", "pec": "perfect conductor"}
+SOLVED = "errors of 0.01 to 1 % of the largest amplitude (0.1 dB)"
+"""Of the equation and the T-matrix: what they stated on bodies with edges and without."""
+
+
+class Forecast(NamedTuple):
+    """The body and its size; the method in words, with time, memory and error; nodes of the equation, 0 where none."""
+
+    body: str
+    by: str
+    nodes: int
+
+    def __str__(self) -> str:
+        return f"{self.body}: {self.by}"
+
+
+def boundary_words(*boundaries: BoundaryLike) -> str:
+    """What the surface is to the wave.
+
+    Examples
+    --------
+    >>> boundary_words("soft", "pec"), boundary_words("impedance:0.5")
+    ('soft (pressure release) and perfect conductor', 'impedance:0.5')
+    """
+    names = [boundary_name(one) for one in boundaries]
+    return " and ".join(KINDS.get(name, name) for name in names)
+
+
+def duration(seconds: float) -> str:
+    """Time as people say it.
+
+    Examples
+    --------
+    >>> duration(0.02), duration(42.0), duration(600.0), duration(8000.0)
+    ('a second', '42 s', '10 min', '2.2 h')
+    """
+    if seconds < 90:
+        return "a second" if seconds < 1.5 else f"{seconds:.2g} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.2g} h"
+
+
+def size_words(shape: Any, wavenumbers: ArrayLike, *, metres: bool, cure: str) -> str:
+    """Size of the body in its unit and in wavelengths, with a question where a unit seems to be forgotten.
+
+    Raises
+    ------
+    InvalidInputError
+        If no field is known of a body so small or large; ``cure`` says what to give.
+    """
+    k = np.atleast_1d(np.asarray(wavenumbers, dtype=float))
+    unit, side = "m" if metres else unit_of(shape), _longest(shape)
+    ends = [side * float(end) / (2 * np.pi) for end in (k.min(), k.max())]
+    told = " to ".join(dict.fromkeys(f"{end:.3g}" for end in ends))
+    size = f"{side:.4g} {unit}, {told} wavelengths across"
+    try:
+        checked_across(shape, float(k.min()), float(k.max()))
+    except InvalidInputError as error:
+        word = "small" if ends[0] < 1 else "large"
+        raise InvalidInputError(f"the body is {size}, too {word} for any field; {cure}") from error
+    doubt = "small" if ends[1] < SMALL else "large" if ends[0] > LARGE else ""
+    return f"{size} (so {doubt}? {cure})" if doubt else size
+
+
+def _longest(shape: Any) -> float:
+    """Longest side of the body, L: of its own points where its bounds are those of a grid about it."""
+    padded = any(hasattr(shape, name) for name in ("fit", "expression"))
+    points = points_of_charts(shape) if padded and not why_no_rays(shape) else np.asarray(shape.bounds, dtype=float)
+    return float(np.max(np.ptp(points, axis=0)))
+
+
+def forecast(
+    shape: Any,
+    wavenumbers: ArrayLike,
+    boundary: BoundaryLike,
+    *,
+    method: str = "auto",
+    radar: tuple[ArrayLike, ArrayLike] | None = None,
+    observers: int = 1,
+    metres: bool = False,
+    cure: str = "give the wavenumber in the inverse of the body's unit",
+) -> Forecast:
+    """What a field of the body is made by, what that takes, and about which error it has.
+
+    ``radar``: azimuths and elevations (n,), degrees, of the incidences of a backscatter cut, or of one incidence with
+    several ``observers``. Without it the equation's cost is that of one incidence, and none is told of rays.
+    """
+    k = np.atleast_1d(np.asarray(wavenumbers, dtype=float))
+    without, pieces = why_no_rays(shape), is_piecewise(shape)
+    kind = without or (f"in smooth pieces with {len(shape.creases)} creases" if pieces else "one smooth surface")
+    size = size_words(shape, k, metres=metres, cure=cure)
+    body = f"body: {kind}, {size}"
+    incidences = None if radar is None else (np.atleast_1d(radar[0]), np.atleast_1d(radar[1]))
+    count, top = 1 if incidences is None else len(incidences[0]), float(k.max())
+    if method == "rays":
+        return Forecast(body, f"rays alone, in seconds, {_errors(shape, k)}", 0)
+    if method == "t-matrix":
+        plan = [expected(shape, one, boundary) for one in k]
+        takes = _takes(sum(one.seconds for one in plan), plan[-1].memory)
+        return Forecast(body, f"the T-matrix of the body, one for all angles, {takes}, {SOLVED}", 0)
+    smooth = not (without or pieces)
+    if smooth and is_large(shape, top, boundary) and method != "equation":
+        nodes, refused, equation = 0, "it is too large", ""
+    else:
+        solved = plan_of(shape, top, boundary, ASKED if method == "equation" else SECONDS, incidences=count)
+        # nodes grow with the area in square wavelengths, and what pairs of them take with the square of that
+        share = float(np.sum((k / top) ** 4))
+        nodes, refused = solved.nodes, solved.refused
+        takes = _takes(share * solved.seconds, solved.memory)
+        equation = f"the integral equation between {nodes} nodes, {takes}, {SOLVED}"
+    if not refused and (not smooth or method == "equation"):
+        by = equation
+    elif without:
+        by = f"nothing within half a minute: {refused}; creeping.solve(..., seconds=) takes as long as it may"
+    elif has_edges(shape):
+        by = f"rays and physical optics, which err by several per cent (0.5 dB): the equation is not solved, {refused}"
+    elif not refused and not _reached(shape, k):
+        by = f"{equation}, as parts are more curved than rays and currents allow"
+    else:
+        takes = _cost(shape, k, incidences, observers, boundary)
+        by = f"creeping rays and surface currents, {takes}{_errors(shape, k)}"
+        by += "" if refused else f"; where these fail, {equation}"
+    return Forecast(body, by, nodes)
+
+
+def _takes(seconds: float, memory: float) -> str:
+    return f"about {duration(seconds)} and {memory / 1e9:.2g} GB"
+
+
+def _cost(
+    shape: Any, k: FloatArray, radar: tuple[FloatArray, FloatArray] | None, observers: int, boundary: BoundaryLike
+) -> str:
+    """What currents may take where they must serve all, hundreds of times as slowly as rays."""
+    if radar is None:
+        return ""
+    seconds = seconds_of_currents(shape, k, *radar, observers=observers, boundary=boundary)
+    return f"up to about {duration(seconds)} if currents serve all, " if seconds else ""
+
+
+def _reached(shape: Any, k: FloatArray) -> bool:
+    """Whether the expansions of rays and currents reach to the lowest wavenumber."""
+    found = body_validity(shape, wavenumber=float(k.min()))
+    return found.least_k_rho >= EDGE[0] and found.largest_transverse <= EDGE[1]
+
+
+def _errors(shape: Any, k: FloatArray) -> str:
+    """How far rays and currents err, by the lowest wavenumber."""
+    if why_no_rays(shape) or has_edges(shape):
+        return "errors of several per cent of the largest amplitude (0.5 dB)"
+    if _reached(shape, k):
+        return "errors of 0.1 to 5 % of the largest amplitude (0.4 dB)"
+    return "errors of up to 40 % of the largest amplitude (3 dB), as parts are more curved than a wavelength allows"
+
+
+def radar_of(direction: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Azimuth and elevation (1,), degrees, of where a wave comes from that travels in a direction."""
+    azimuth, elevation = azimuth_elevation_of(-np.asarray(direction, dtype=float)[None])
+    return np.degrees(azimuth), np.degrees(elevation)
