@@ -15,8 +15,8 @@ from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import HARD, SOFT, Boundary
 from creeping.field.marching.layer import MarchedRays, march_rays
 from creeping.field.marching.profile import RayProfiles
-from studies.reference.section import SectionField
-from studies.reference.section_shapes import Section
+from tests.reference.section import SectionField
+from tests.reference.section_shapes import Section
 
 BLEND = (1.0, 0.8)
 """Shares of the way back to the start between which optics gives over to the marched wave."""

@@ -23,7 +23,7 @@ import creeping as cr
 from creeping._typing import Any, ComplexArray, FloatArray
 from studies._point_coverage import bright, cases, coverage, not_ok, parts_off, places, print_table, random_fan
 from studies.field_coverage import DIPOLE_DEPTHS, bodies
-from studies.reference import dipoles, sphere
+from tests.reference import dipoles, sphere
 
 WAVENUMBERS = (10.0, 20.0)
 BODIES = ("sphere", "triaxial", "slender", "flat", "egg", "twisted", "peanut")

@@ -1,6 +1,6 @@
 """How accurate is the far field of bodies with edges and tips? `creeping.solve` against equations of other kinds.
 
-Far fields of `studies.reference.cases`, sixty directions each with the forward lobe among them: bodies of revolution by
+Far fields of `tests.reference.cases`, sixty directions each with the forward lobe among them: bodies of revolution by
 Fourier modes on panels that are graded towards edges, the cube by parity classes. For each body and boundary: nodes;
 root mean square and largest of the error over the directions, per cent of the largest |f| (of the worst incidence and
 polarisation); share of the values whose stated error covers the true one, per cent; stated over true error in the
@@ -19,8 +19,8 @@ import creeping as cr
 import scatterers as sc
 from creeping._typing import FloatArray
 from scatterers.exact.profile import Arc, Line, Segment
-from studies.reference import stored
-from studies.reference.cases import ADMITTANCE
+from tests.reference import stored
+from tests.reference.cases import ADMITTANCE
 
 HALF_BALL: list[Segment] = [Line((0, 0), (0, 1)), Arc((0, 1), (1, 0), (0, 0))]
 """Profile, L."""

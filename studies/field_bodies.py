@@ -17,7 +17,7 @@ from creeping.geometry.surface import normal, project
 from creeping.rays.fan import RayFan
 from creeping.rays.shedding import shed_near
 from creeping.shadow.attachment import occluded
-from studies.reference import clouds, fundamental
+from tests.reference import clouds, fundamental
 
 INCIDENCES = {
     "triaxial": ((0.3, 0.5, 0.812), (0.8, -0.3, 0.5), (0.1, 0.9, 0.4)),

@@ -27,7 +27,7 @@ from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.errors import SingularIncidenceError
 from creeping.field.body_currents import cached_currents
 from creeping.rays.fan import RayFan
-from studies.reference import clouds, dipoles, fundamental, sphere
+from tests.reference import clouds, dipoles, fundamental, sphere
 
 WAVENUMBERS = (8.0, 14.0, 24.0)
 BOUNDARIES: tuple[Any, ...] = ("soft", "hard", 0.7, "pec")
@@ -127,7 +127,7 @@ def conducting_ball(k: float, d: FloatArray, r: FloatArray, boundary: Any = "pec
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     before, after = dipoles.frames(d[None])[0], dipoles.frames(r)
     total = np.zeros((len(r), 2, 2), dtype=complex)
-    # across and in the plane of scattering, as `studies.reference.sphere` has them
+    # across and in the plane of scattering, as `tests.reference.sphere` has them
     for amplitude, e, s in zip(
         sphere.pec_far_field(k, 1.0, r @ d),
         (across, np.cross(across, d)),

@@ -18,7 +18,7 @@ from creeping.field.far_geometry import far_geometry
 from creeping.field.far_rays import isolated_rays
 from creeping.field.forward import fan_half
 from creeping.rays.fan import RayFan
-from studies.reference import sphere, watson
+from tests.reference import sphere, watson
 
 KA = (10.0, 30.0, 100.0, 300.0)
 AZIMUTH = 0.3

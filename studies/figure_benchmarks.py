@@ -23,7 +23,7 @@ from studies.benchmarks import (
     published_strengths,
     target_strengths,
 )
-from studies.reference import sphere
+from tests.reference import sphere
 
 STYLES = {"VV": "-", "HH": "--", "hard": "-", "soft": "--"}
 KILOHERTZ = (12.0, 400.0)

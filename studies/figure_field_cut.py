@@ -8,7 +8,7 @@ import creeping as cr
 from creeping._typing import Any
 from creeping.plotting import far_cut_picture
 from studies.field_sphere import sphere_fan
-from studies.reference import sphere
+from tests.reference import sphere
 
 KA = 30.0
 

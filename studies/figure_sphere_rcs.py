@@ -14,7 +14,7 @@ import scatterers as sc
 from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.plotting.palette import COLOURS, EXACT
 from creeping.plotting.pictures import new_figure
-from studies.reference import sphere
+from tests.reference import sphere
 
 RANGE = (5.0, 100.0)
 LENGTH = 6.6

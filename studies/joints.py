@@ -16,7 +16,7 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import ComplexArray, FloatArray
-from studies.reference.revolution import Profile, capsule_profile, cone_sphere_profile, scatter_by_rings
+from tests.reference.revolution import Profile, capsule_profile, cone_sphere_profile, scatter_by_rings
 
 CASES: dict[str, tuple[Any, Profile]] = {
     "capsule 4": (sc.Capsule(1.0, 4.0), capsule_profile(1.0, 4.0)),

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from studies._section_waves import REGIONS, Admittance, far_errors, region_errors
-from studies.reference.section import SectionSolver
-from studies.reference.section_shapes import CapsuleSection, Section, bump, ellipse, kite, peanut
+from tests.reference.section import SectionSolver
+from tests.reference.section_shapes import CapsuleSection, Section, bump, ellipse, kite, peanut
 
 FACTOR = 1.5
 """Within which the figures of the prototype are to be reproduced."""

@@ -23,7 +23,7 @@ import creeping as cr
 from creeping._typing import Any, ComplexArray, FloatArray
 from studies._point_coverage import bright, cases, coverage, not_ok, parts_off, places, print_table, random_fan
 from studies.field_coverage import bodies
-from studies.reference import fundamental, sphere
+from tests.reference import fundamental, sphere
 
 WAVENUMBERS = (10.0, 20.0, 30.0)
 BOUNDARIES: tuple[Any, ...] = ("soft", "hard", 0.7)

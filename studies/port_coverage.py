@@ -13,8 +13,8 @@ import numpy as np
 
 import creeping as cr
 import scatterers as sc
-from studies.reference.clouds import ellipsoid
-from studies.reference.dipoles import coupled, sphere_coupling
+from tests.reference.clouds import ellipsoid
+from tests.reference.dipoles import coupled, sphere_coupling
 
 CASES = (
     ((1.0, 0.8, 0.6), 20.0, 0.2, 1),

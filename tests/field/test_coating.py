@@ -7,7 +7,7 @@ import shared_bodies as sc
 import creeping as cr
 from creeping.field import on_body
 from creeping.field.special.fock import surface_function
-from studies.reference import near_source, sphere
+from tests.reference import near_source, sphere
 
 K = 25.0
 ETA = (0.4 + 0.1j, 0.25)

@@ -13,9 +13,9 @@ from creeping.errors import InvalidInputError
 from creeping.field.point_result import FieldStatus
 from creeping.files import write_touchstone
 from creeping.geometry.surface import normal, project
-from studies.reference import stored
-from studies.reference.dipoles import sphere_coupling
-from studies.reference.slots import (
+from tests.reference import stored
+from tests.reference.dipoles import sphere_coupling
+from tests.reference.slots import (
     plane_antennas,
     plane_monopoles,
     plane_slots,

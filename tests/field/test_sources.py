@@ -6,7 +6,7 @@ import shared_bodies as sc
 
 import creeping as cr
 from studies.field_coverage import bodies
-from studies.reference import fundamental, sphere
+from tests.reference import fundamental, sphere
 
 K = 25.0
 TOWARDS = cr.fibonacci_directions(3)

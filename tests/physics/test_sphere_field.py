@@ -6,7 +6,7 @@ import shared_bodies as sc
 
 import creeping as cr
 from studies import field_sphere
-from studies.reference import sphere
+from tests.reference import sphere
 
 FACTOR = 1.5
 

@@ -6,7 +6,7 @@ import shared_bodies as sc
 from body_checks import directions
 
 from studies import field_coverage as coverage
-from studies.reference import clouds, dipoles
+from tests.reference import clouds, dipoles
 
 
 def test_the_frames_of_the_conducting_ball(rng):

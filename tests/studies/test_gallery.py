@@ -123,7 +123,11 @@ def test_commands_and_studies_are_understood(page):
 
 
 def study_is_there(words):
-    """Assert that ``studies...`` can be run, with these options."""
+    """Assert that ``studies...``, or the fuzzing among the tests, can be run, with these options."""
+    if words[0] == "tests.fuzz":
+        text = text_of(ROOT / "tests" / "fuzz" / "__main__.py")
+        assert all(f'"{word}"' in text for word in words[1:] if word.startswith("-")), words
+        return
     name = words[0].removeprefix("studies").removeprefix(".")
     if not name:
         assert len(words) == 1 or words[1] in command.sources(), words
@@ -138,7 +142,7 @@ def test_all_studies_are_listed():
     rows = dict(line.split(maxsplit=1) for line in done.stdout.split("\n\n")[0].splitlines())
     folder = Path(studies.__file__).parent
     modules = {path.stem for path in folder.glob("*.py") if not path.stem.startswith("_")}
-    assert set(rows) == set(studies.FIGURES) | modules - set(studies.FIGURES.values()) | {"gallery", "fuzz"}
+    assert set(rows) == set(studies.FIGURES) | modules - set(studies.FIGURES.values()) | {"gallery"}
     assert {name: rows[name] for name in studies.FIGURES} == studies.titles()
     for name, source in command.sources().items():
         runs = source if source.stem != "__init__" else source.with_name("__main__.py")
