@@ -9,7 +9,7 @@ import numpy as np
 import scatterers as sc
 from creeping._typing import Any
 from creeping.plotting.mesh_picture import MeshValues, mesh_picture
-from studies._meshes import almond
+from tests.exact_meshes import almond
 
 
 def draw(path: Path, quick: bool) -> dict[str, Any]:

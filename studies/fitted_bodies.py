@@ -24,7 +24,7 @@ from creeping._typing import FloatArray, IntArray
 from creeping.geodesics.bundle import project_bundle, random_bundle_points
 from creeping.geodesics.states import pack
 from creeping.geometry.surface import normal, project
-from studies._meshes import on_body, scattered, slivers
+from tests.exact_meshes import on_body, scattered, slivers
 
 POINTS, RAYS, LENGTH = 3000, 60, 2.0
 NAMES = ("ellipsoid", "torus", "twisted")

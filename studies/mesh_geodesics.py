@@ -15,8 +15,8 @@ import numpy as np
 import creeping as cr
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.geodesics.bundle import project_bundle
-from studies._meshes import on_body
 from studies.fitted_bodies import mesh_body
+from tests.exact_meshes import on_body
 
 NAMES = ("ellipsoid", "torus", "twisted")
 COUNTS = (2000, 10_000, 40_000)

@@ -4,7 +4,7 @@ Faults are those that a slip of the pen makes: + for -, * for /, a comparison tu
 one, a sign lost. Modules and places are drawn from ``--seed``. Each fault is planted into a copy of the working tree;
 first run the tests that name the module, then those of its room, then all, each until one fails. A run that does not
 end in time, or takes too much memory, has seen the fault too. Run
-``python -m studies.planted_faults [--count 40] [--seed 1] [--only I ...] [--runs 2] [-o FILE]`` (hours).
+``python -m tests.planted_faults [--count 40] [--seed 1] [--only I ...] [--runs 2] [-o FILE]`` (hours).
 """
 
 import argparse
