@@ -5,7 +5,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from studies.field_coverage import bodies
+from studies.accuracy.bodies import bodies
 from tests.reference import fundamental, sphere
 
 K = 25.0

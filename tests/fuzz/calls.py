@@ -375,7 +375,7 @@ def _calls_of_bodies(made: dict[str, Any]) -> dict[str, Call]:
         "sc.Cad": (sc.Cad, {"path": made["mesh"].with_suffix(".step"), "points": 500, **files, "units": None}),
     }
     if not made["mesh"].with_suffix(".step").exists():
-        from studies.fitted_bodies import write_ellipsoid
+        from tests.cad_files import write_ellipsoid
 
         try:
             write_ellipsoid(made["mesh"].with_suffix(".step"))

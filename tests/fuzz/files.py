@@ -246,7 +246,7 @@ class CadFiles:
 
     def prepare(self, folder: Path) -> None:
         """Have gmsh write an ellipsoid."""
-        from studies.fitted_bodies import write_ellipsoid
+        from tests.cad_files import write_ellipsoid
 
         write_ellipsoid(folder / "seed.step")
         self.seed = (folder / "seed.step").read_bytes()
