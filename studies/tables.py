@@ -13,7 +13,7 @@ Row = dict[str, Any]
 Table = Callable[..., Iterable[Row]]
 """The first line of its docstring is the title."""
 WIDE, NARROW = 16, 8
-"""Characters of the first column, which names the body, and of the others at least."""
+"""Characters of the first column, which names the body, and of the others, at least."""
 
 
 def show(title: str, rows: Iterable[Row]) -> None:
@@ -22,7 +22,8 @@ def show(title: str, rows: Iterable[Row]) -> None:
     widths: list[int] = []
     for row in rows:
         if not widths:
-            widths = [WIDE, *(max(NARROW, len(name), len(_text(row[name]))) for name in list(row)[1:])]
+            least = [WIDE, *[NARROW] * (len(row) - 1)]
+            widths = [max(n, len(name), len(_text(row[name]))) for n, name in zip(least, row, strict=True)]
             print(_line(row, widths))
         print(_line(map(_text, row.values()), widths), flush=True)
 

@@ -17,7 +17,7 @@ from studies import tables
 from studies.accuracy.bodies import random_directions
 from studies.tables import Row
 from tests.reference.clouds import ellipsoid
-from tests.reference.dipoles import coupled, sphere_coupling
+from tests.reference.hard_ports import coupled, sphere_coupling
 
 CASES = (
     ((1.0, 0.8, 0.6), 20.0, 0.2, 1),

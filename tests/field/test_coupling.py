@@ -14,8 +14,7 @@ from creeping.field.point_result import FieldStatus
 from creeping.files import write_touchstone
 from creeping.geometry.surface import normal, project
 from tests.reference import stored
-from tests.reference.dipoles import sphere_coupling
-from tests.reference.slots import (
+from tests.reference.antennas import (
     plane_antennas,
     plane_monopoles,
     plane_slots,
@@ -23,6 +22,7 @@ from tests.reference.slots import (
     sphere_monopoles,
     sphere_slots,
 )
+from tests.reference.hard_ports import sphere_coupling
 
 KINDS = ("ports", "slots", "monopoles", "antennas")
 DEGREES = {

@@ -8,7 +8,7 @@ import creeping as cr
 from creeping.field.on_body import ray_magnitude
 from creeping.geometry.surface import normal
 from tests.reference import clouds
-from tests.reference.near_source import beside_source
+from tests.reference.fundamental import beside_source
 from tests.reference.sphere import source_on_sphere
 
 # relative errors, %, at 5 to 50 degrees behind the line: distance in radii, k a

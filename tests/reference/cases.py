@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from tests.reference import dipoles, fundamental, slots
+from tests.reference import antennas, dipoles, fundamental, hard_ports
 from tests.reference.clouds import Body, ellipsoid, star
+from tests.reference.conditions import Arrays, Boundary, FloatArray
 from tests.reference.generatrix import pieces_profile
 from tests.reference.mirrored_box import scatter_box
 from tests.reference.modal_conductor import scatter_conductor
 from tests.reference.modal_equation import scatter_by_modes
 from tests.reference.revolution import Profile, wave_directions
-from tests.reference.section_shapes import Arrays, Boundary, FloatArray
 from tests.reference.two_spheres import Kind, scatter_spheres
 
 HEIGHTS = (0.05, 0.08, 0.11, 0.14)
@@ -31,7 +31,7 @@ def ellipsoid_slots() -> Arrays:
     sources = np.sign(sources) * np.maximum(np.abs(sources), 0.3)
     sources /= np.linalg.norm(sources, axis=1, keepdims=True)
     points = points[np.max(points @ sources.T, axis=1) < 0.95]
-    found = slots.coupled_slots(ellipsoid(0.75, 0.9, 1.15), 12.0, sources, points, depth=0.25, heights=HEIGHTS)
+    found = antennas.coupled_slots(ellipsoid(0.75, 0.9, 1.15), 12.0, sources, points, depth=0.25, heights=HEIGHTS)
     return {"ports": found.ports, "points": found.points, "tangents": found.tangents, "values": found.values}
 
 
@@ -71,21 +71,21 @@ def ellipsoid_ports() -> Arrays:
     sources = np.sign(sources) * np.maximum(np.abs(sources), 0.25)
     sources /= np.linalg.norm(sources, axis=1, keepdims=True)
     body = ellipsoid(0.8, 0.9, 1.1)
-    found = dipoles.coupled(body, 14.0, sources, points, depth=0.25, heights=HEIGHTS, per_wavelength=7.0)
+    found = hard_ports.coupled(body, 14.0, sources, points, depth=0.25, heights=HEIGHTS, per_wavelength=7.0)
     return {"ports": found.ports, "points": found.points, "values": found.values, "spread": found.spread}
 
 
 def ellipsoid_monopoles() -> Arrays:
     """E of a monopole on the conductor (0.75, 0.9, 1.15), k = 12, at points all about it."""
     body, sources, points = _about_a_monopole(60)
-    found = slots.coupled_monopoles(body, 12.0, sources, points, depth=0.25, heights=LOW_HEIGHTS)
+    found = antennas.coupled_monopoles(body, 12.0, sources, points, depth=0.25, heights=LOW_HEIGHTS)
     return {"ports": found.ports, "points": found.points, "values": found.values, "spread": found.spread}
 
 
 def ellipsoid_antennas() -> Arrays:
     """H of the same monopole along two tangents of each point."""
     body, sources, points = _about_a_monopole(80)
-    found = slots.slots_of_monopoles(body, 12.0, sources, points, depth=0.25, heights=LOW_HEIGHTS)
+    found = antennas.slots_of_monopoles(body, 12.0, sources, points, depth=0.25, heights=LOW_HEIGHTS)
     return {name: getattr(found, name) for name in ("ports", "points", "tangents", "values", "spread")}
 
 

@@ -16,7 +16,7 @@ from typing import Protocol
 
 import numpy as np
 
-from tests.reference.section_shapes import FloatArray
+from tests.reference.conditions import FloatArray
 
 GRID = 240
 """Cells along z and phi of the area table; linear interpolation in it moves a point by less than a tenth of h."""

@@ -11,6 +11,8 @@ On a body with m mirrors the plane wave falls into 2^m parity classes s, each so
 
 with one factorisation a class for all directions. The residual of the condition, on points of its own, bounds the
 error: by uniqueness the exact scattered field is a sum of the found one and what radiates from the residual.
+
+A point source e^{ikR}/(4πR) beside the body is solved without classes: for a few thousand sources inside.
 """
 
 from dataclasses import dataclass
@@ -19,8 +21,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import qr, solve_triangular
 
-from tests.reference.clouds import Cloud, Spread, images
-from tests.reference.section_shapes import Boundary, ComplexArray, FloatArray, condition, positive
+from tests.reference.clouds import Body, Cloud, Spread, images
+from tests.reference.conditions import Boundary, ComplexArray, FloatArray, condition, positive
 
 BLOCK = 4_000_000
 """Entries of a kernel matrix held at once, 64 MB."""
@@ -108,6 +110,26 @@ def least_squares(matrix: ComplexArray, right: ComplexArray) -> ComplexArray:
     return np.asarray(solve_triangular(upper[:n, :n], upper[:n, n:], check_finite=False))
 
 
+def by_parity(mirrors: tuple[int, ...], blocks: list[ComplexArray], waves: ComplexArray) -> ComplexArray:
+    """Strengths (g, s, d) at all images of sources, class by class.
+
+    ``blocks`` are what the image g of each source makes at the points (n, s), ``waves`` the condition of the incident
+    waves as the image g of the points sees them (g, n, d).
+    """
+    odd = (images(mirrors)[:, list(mirrors)] < 0).astype(int)
+    # chi_s(g) = Π over the mirrors of s that g turns
+    characters = np.where(odd @ odd.T % 2, -1.0, 1.0)
+    classes = []
+    for signs in characters:
+        matrix = np.zeros_like(blocks[0])
+        for sign, block in zip(signs, blocks, strict=True):
+            matrix += sign * block
+        right = np.asarray(-np.tensordot(signs, waves, axes=1) / len(characters), dtype=complex)
+        classes.append(least_squares(matrix, right))
+    # q at the image g y: Σ_s chi_s(g) q_s
+    return np.tensordot(characters.T, np.stack(classes), axes=1)
+
+
 def solve(
     points: ArrayLike,
     normals: ArrayLike,
@@ -148,21 +170,10 @@ def solve(
         )
     group = images(mirrors)
     y = sources.points - depth * sources.normals
-    # chi_s(g) = Π over the mirrors of s that g turns
-    odd = group[:, list(mirrors)] < 0
-    characters = np.where(odd.astype(int) @ odd.T.astype(int) % 2, -1.0, 1.0)
     blocks = [_boundary_kernel(cloud, y * g, wavenumber, alpha, beta) for g in group]
     # u_inc(g x) is the wave of direction g d
     waves = np.stack([_incident(cloud, wavenumber, d * g, alpha, beta) for g in group])
-    classes = []
-    for signs in characters:
-        matrix = np.zeros_like(blocks[0])
-        for sign, block in zip(signs, blocks, strict=True):
-            matrix += sign * block
-        right = np.asarray(-np.tensordot(signs, waves, axes=1) / len(group), dtype=complex)
-        classes.append(least_squares(matrix, right))
-    # q at the image g y: Σ_s chi_s(g) q_s
-    strengths = np.concatenate([np.tensordot(signs, np.stack(classes), axes=1) for signs in characters.T])
+    strengths = np.concatenate(by_parity(mirrors, blocks, waves))
     everywhere = np.concatenate([y * g for g in group])
     residual = np.zeros(len(d))
     step = max(1, BLOCK // len(everywhere))
@@ -214,3 +225,83 @@ def scatter(
         depth=depth,
         mirrors=body.mirrors,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class BesideSource:
+    """Field of one point source.
+
+    Attributes
+    ----------
+    wavenumber : float, 1/L
+    position : (3,), L
+    sources, strengths : (s, 3), L and (s,)
+        Fundamental solutions.
+    residual : float
+        Largest of the condition at points between those it was fitted at, in the largest of the incident field there.
+    """
+
+    wavenumber: float
+    position: FloatArray
+    sources: FloatArray
+    strengths: ComplexArray
+    residual: float
+
+    def total(self, points: ArrayLike) -> ComplexArray:
+        """Total field on and outside the body: (n, 3) -> (n,)."""
+        x = np.asarray(points, dtype=float)
+        incident = _kernel(x, self.position[None], self.wavenumber)[:, 0] / (4 * np.pi)
+        return np.asarray(incident + _kernel(x, self.sources, self.wavenumber) @ self.strengths)
+
+    def slope(self, points: ArrayLike, normals: ArrayLike) -> ComplexArray:
+        """∂u/∂n of the total field on the body, 1/L: (n, 3) x 2 -> (n,)."""
+        k, cloud = self.wavenumber, Cloud(np.asarray(points, dtype=float), np.asarray(normals, dtype=float))
+        incident = _boundary_kernel(cloud, self.position[None], k, 0.0, k)[:, 0] / (4 * np.pi)
+        return np.asarray(incident + _boundary_kernel(cloud, self.sources, k, 0.0, k) @ self.strengths)
+
+
+def beside_source(
+    body: Body,
+    wavenumber: float,
+    position: ArrayLike,
+    boundary: Boundary,
+    *,
+    depth: float,
+    per_wavelength: float = 6.0,
+    least: int = 1200,
+) -> BesideSource:
+    """Solve for a point source outside a body.
+
+    Parameters
+    ----------
+    body : Body
+    wavenumber : float, 1/L
+    position : (3,), L
+        Outside, no nearer than a few spacings of the fundamental solutions.
+    boundary : "soft", "hard" or complex
+    depth : float, L
+        Of the fundamental solutions under the surface.
+    per_wavelength : float
+        Fundamental solutions a wavelength.
+    least : int
+        Fundamental solutions, at least.
+    """
+    positive(wavenumber=wavenumber, depth=depth, per_wavelength=per_wavelength)
+    k, z = wavenumber, np.asarray(position, dtype=float)
+    alpha, beta = condition(boundary)
+    spacing = min(2 * np.pi / k / per_wavelength, np.sqrt(body.area() / least))
+    fit, under, checks = (_whole(body, spacing * ratio) for ratio in (1 / np.sqrt(2), 1.0, 1.37))
+    y = under.points - depth * under.normals
+    right = -_boundary_kernel(fit, z[None], k, alpha, beta) / (4 * np.pi)
+    strengths = least_squares(_boundary_kernel(fit, y, k, alpha, beta), right)[:, 0]
+    incident = _boundary_kernel(checks, z[None], k, alpha, beta)[:, 0] / (4 * np.pi)
+    left = incident + _boundary_kernel(checks, y, k, alpha, beta) @ strengths
+    largest = float(np.max(np.abs(_kernel(checks.points, z[None], k)))) / (4 * np.pi)
+    return BesideSource(k, z, y, strengths, float(np.max(np.abs(left))) / largest)
+
+
+def _whole(body: Body, spacing: float) -> Cloud:
+    """Points all over a body, images of those of a part of it."""
+    part, group = body.spread(spacing), images(body.mirrors)
+    points, normals = (np.concatenate([values * g for g in group]) for values in (part.points, part.normals))
+    return Cloud(points, normals)

@@ -20,8 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tests.reference.conditions import ComplexArray, FloatArray
 from tests.reference.revolution import Profile
-from tests.reference.section_shapes import ComplexArray, FloatArray
 
 ORDER = 10
 """Nodes of a panel."""

@@ -27,8 +27,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
+from tests.reference.conditions import Boundary, ComplexArray, FloatArray, IntArray, condition, positive
 from tests.reference.generatrix import GAUSS, lagrange
-from tests.reference.section_shapes import Boundary, ComplexArray, FloatArray, IntArray, condition, positive
 
 IMAGES = np.array(list(product((1.0, -1.0), repeat=3)))
 """Mirrors g (8, 3)."""

@@ -25,12 +25,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import jv
 
+from tests.reference.conditions import ComplexArray, FloatArray, positive
 from tests.reference.dipoles import frames
 from tests.reference.fundamental import least_squares
 from tests.reference.generatrix import Azimuth, Panels, modal_matrix, waves
 from tests.reference.modal_equation import order_count
 from tests.reference.revolution import Profile, wave_directions
-from tests.reference.section_shapes import ComplexArray, FloatArray, positive
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import jv, jvp
 
+from tests.reference.conditions import Boundary, ComplexArray, FloatArray, condition, positive
 from tests.reference.fundamental import least_squares
 from tests.reference.generatrix import Azimuth, Panels, modal_matrix, waves
 from tests.reference.revolution import Profile, wave_directions
-from tests.reference.section_shapes import Boundary, ComplexArray, FloatArray, condition, positive
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,8 @@ from scipy.interpolate import CubicSpline
 from scipy.special import jv
 
 from tests.reference.clouds import Cloud
+from tests.reference.conditions import Boundary, ComplexArray, FloatArray, condition, positive
 from tests.reference.fundamental import least_squares
-from tests.reference.section_shapes import Boundary, ComplexArray, FloatArray, condition, positive
 
 BLOCK = 1_500_000
 """Values of a kernel held at once."""

@@ -40,16 +40,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import hankel1, i0, jv, k0
 
-from tests.reference.section_shapes import (
-    Boundary,
-    ComplexArray,
-    FloatArray,
-    Nodes,
-    Section,
-    condition,
-    positive,
-    series_length,
-)
+from tests.reference.conditions import Boundary, ComplexArray, FloatArray, condition, positive, series_length
+from tests.reference.section_shapes import Nodes, Section
 
 PER_LENGTH, MORE, WITH_JOINTS = 1.5, 160, 640
 """Nodes for each unit of k ds, those beyond, and the fewest with joints."""

@@ -4,39 +4,26 @@
 
 Smooth ones are given by x(t), t of 0..2 pi, and its derivatives; a capsule by arcs and lines, whose curvature jumps at
 its joints.
-
-Also here: the boundary conditions of the references, in one form.
-
-    alpha u + (beta/k) ∂u/∂n = 0
-
-soft: alpha = 1, beta = 0; hard: alpha = 0, beta = 1; impedance eta: alpha = i eta, beta = 1.
-
-The time factor is e^{-iωt}, n the outward normal, eta = rho c/Z, passive for Re eta ≥ 0.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, Protocol, TypeAlias
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import make_interp_spline
+
+from tests.reference.conditions import FloatArray
 
 SAMPLES = 4096
 """Of arc length over the parameter; splines of degree 7 between them are good to rounding."""
 GRADING = 6
 """Order to which the nodes' density vanishes at joints."""
 
-FloatArray: TypeAlias = NDArray[np.float64]
-IntArray: TypeAlias = NDArray[np.int64]
-ComplexArray: TypeAlias = NDArray[np.complex128]
-Arrays: TypeAlias = dict[str, NDArray[np.floating | np.complexfloating]]
-"""What a case returns, by names."""
 Curve = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 Radius = Callable[[FloatArray], FloatArray]
-Boundary: TypeAlias = Literal["soft", "hard"] | complex
-"""Soft, hard, or the impedance number eta."""
 
 
 @dataclass(frozen=True)
@@ -273,28 +260,3 @@ def bump(height: float, width: float, at: float, a: float = 1.0, b: float = 0.8)
             + gauss(t) * (lean(t) ** 2 - np.cos(t - at) / width**2)
         ),
     )
-
-
-def condition(boundary: Boundary) -> tuple[complex, complex]:
-    """Coefficients (alpha, beta) of alpha u + (beta/k) ∂u/∂n = 0."""
-    if isinstance(boundary, str):
-        if boundary not in ("soft", "hard"):
-            raise ValueError(f"boundary is 'soft', 'hard' or a complex eta; got {boundary!r}")
-        return (1.0, 0.0) if boundary == "soft" else (0.0, 1.0)
-    return 1j * complex(boundary), 1.0
-
-
-def series_length(x: float) -> int:
-    """Orders after which the series of a body of size x = ka has converged to rounding.
-
-    J_n(x) falls beyond n = x like Ai(z), z = (2/x)^{1/3} (n - x): 12 x^{1/3} past x it is below 1e-16. Not many more,
-    lest H_n(x), which grows as J_n falls, overflow at small x.
-    """
-    return int(x + 12 * x ** (1 / 3)) + 12
-
-
-def positive(**values: float) -> None:
-    """Refuse numbers that are not positive and finite."""
-    for name, value in values.items():
-        if not (np.isfinite(value) and value > 0):
-            raise ValueError(f"{name} is {value!r}; a positive finite number is needed")

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import spherical_jn, spherical_yn
 
-from tests.reference.section_shapes import Boundary, ComplexArray, FloatArray, condition, positive, series_length
+from tests.reference.conditions import Boundary, ComplexArray, FloatArray, condition, positive, series_length
 
 
 def _hankel(x: FloatArray, orders: int) -> Iterator[ComplexArray]:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.reference.section_shapes import Arrays
+from tests.reference.conditions import Arrays
 
 FOLDER = Path(__file__).with_name("values")
 

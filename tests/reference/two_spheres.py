@@ -31,9 +31,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import sph_legendre_p_all, spherical_jn, spherical_yn
 
+from tests.reference.conditions import Boundary, ComplexArray, FloatArray, condition, positive
 from tests.reference.dipoles import frames
 from tests.reference.fundamental import least_squares
-from tests.reference.section_shapes import Boundary, ComplexArray, FloatArray, condition, positive
 
 CHECKS = 250
 """Points on each sphere at which the residual is taken."""

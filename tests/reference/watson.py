@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 from scipy.special import ai_zeros
 
-from tests.reference.section_shapes import Boundary, ComplexArray, condition, positive
+from tests.reference.conditions import Boundary, ComplexArray, condition, positive
 
 DIGITS = 40
 STEP = 1e-13

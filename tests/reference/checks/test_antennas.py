@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.reference.clouds import ellipsoid
-from tests.reference.dipoles import coupled, sphere_coupling
-from tests.reference.slots import (
+from tests.reference.antennas import (
     TERMS,
     coupled_monopoles,
     coupled_slots,
@@ -18,6 +16,8 @@ from tests.reference.slots import (
     sphere_monopoles,
     sphere_slots,
 )
+from tests.reference.clouds import ellipsoid
+from tests.reference.hard_ports import coupled, sphere_coupling
 
 SERIES = {
     "slots": (sphere_slots, plane_slots),

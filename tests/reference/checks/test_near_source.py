@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.reference import clouds, sphere
-from tests.reference.near_source import beside_source
+from tests.reference.fundamental import beside_source
 
 
 @pytest.mark.parametrize("boundary", ["soft", "hard", 0.4 - 0.3j])

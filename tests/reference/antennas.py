@@ -1,39 +1,26 @@
-"""The magnetic field on a conductor of a slot in it: a tangential magnetic dipole on its surface.
+"""Antennas on a conductor, slots and monopoles in it and on it: the fields that they give each other.
 
-On a sphere of radius a, by Debye potentials E = ∇×(x u) + ∇×∇×(x v)/k, ξₙ = x hₙ(x), x = ka, outgoing, and
-n × E = -p δ on the surface, the tangential field at angle s from the dipole, per unit of p, a voltage times a length,
-times the impedance of free space, is
+A slot is a tangential magnetic dipole on the surface, a monopole an electric dipole along the normal. On a sphere of
+radius a they are Debye potentials, E = ∇×(x u) + ∇×∇×(x v)/k, ξₙ = x hₙ(x), x = ka, outgoing. At angle s from a slot,
+n × E = -p δ on the surface, the tangential H is, per unit of p, a voltage times a length, times the impedance of free
+space, with cₙ = (2n+1)/(4π n(n+1)),
 
     across (p and H along b)    -(i/a²) [F'/sin s - D'']        F = Σ cₙ (ξₙ'/ξₙ) Pₙ(cos s)
     along (along the path)      -(i/a²) [F'' - D'/sin s]        D = Σ cₙ (ξₙ/ξₙ') Pₙ(cos s)
 
-with cₙ = (2n+1)/(4π n(n+1)). On the plane it is twice ik (1 + ∇∇/k²) e^{ikr}/(4πr). Terms grow like n^(3/2); faded out
-smoothly to all orders they sum to Abel's limit.
+A monopole has the potential v alone. Per unit of the moment, a current times a length, H about it and, times the
+admittance of free space, E along the normal are
 
-On other bodies by electric dipoles inside (`tests.reference.dipoles`), with magnetic dipoles at some heights h above
-their ports, and their images: the field is H(0) + H₁ h + H₂ h² + ....
+    H_φ = (1/(x a²)) Σ (2n+1)/4π (ξₙ/ξₙ') dPₙ(cos s)/ds,   φ = n × (direction of the path)
+    E_n = -i/(x² a²) Σ (2n+1)/4π n(n+1) (ξₙ/ξₙ') Pₙ(cos s)
 
-Also here: what slots in a conductor and monopoles on it give each other: H along a slot of a monopole, E_n there of a
-slot.
+By reciprocity E_n of a slot, a magnetic moment p, is minus the H along p of the monopole. On the plane fields of a slot
+on a slot and of a monopole on a monopole are twice ik (1 + ∇∇/k²) e^{ikr}/(4πr), those between both twice
+∇ e^{ikr}/(4πr) × n, -2ik (1 + i/kr) e^{ikr}/(4πr). Terms grow like n^(3/2); faded out smoothly to all orders they sum
+to Abel's limit.
 
-On a sphere of radius a a monopole, an electric moment along n, has the Debye potential of `tests.reference.slots`
-alone, and at angle s from it, per unit of the moment,
-
-    H_φ = (1/(x a²)) Σ (2n+1)/4π (ξₙ/ξₙ') dPₙ(cos s)/ds,   ξₙ = x hₙ(x), x = ka, outgoing,
-
-φ = n × (direction of the path). On the plane it is twice ∇ e^{ikr}/(4πr) × n, -2ik (1 + i/kr) e^{ikr}/(4πr). By
-reciprocity E_n of a slot, a magnetic moment p, is minus the H along p of the monopole. On other bodies either of them
-by electric dipoles inside, as slots (`tests.reference.slots`).
-
-Also here: the electric field on a conductor of a monopole on it: an electric dipole along the normal.
-
-On a sphere of radius a the field is that of a Debye potential, E = ∇×∇×(x v)/k with v = Σ vₙ ξₙ(kr) Pₙ(cos s)/r, and
-at angle s it is, per unit of the moment, a current times a length, times the admittance of free space,
-
-    E_n = -i/(x² a²) Σ (2n+1)/4π n(n+1) (ξₙ/ξₙ') Pₙ(cos s),   ξₙ = x hₙ(x), x = ka, outgoing.
-
-On the plane it is twice ik (1 + ∇∇/k²) e^{ikr}/(4πr). Terms grow like n^(3/2); faded out smoothly to all orders they
-sum to Abel's limit. On other bodies by electric dipoles inside, as slots (`tests.reference.slots`).
+On other bodies by electric dipoles inside (`tests.reference.dipoles`), with the moments at some heights h above their
+ports, and their images: the field is H(0) + H₁ h + H₂ h² + ....
 """
 
 from collections.abc import Callable, Iterator
@@ -43,9 +30,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tests.reference.clouds import Body, Cloud, images
-from tests.reference.dipoles import AROUND, CENTRE, FIT_RINGS, RINGS, _around, _field, _matrix, _tangential, _tangents
-from tests.reference.fundamental import least_squares
-from tests.reference.section_shapes import ComplexArray, FloatArray, positive
+from tests.reference.conditions import ComplexArray, FloatArray, positive
+from tests.reference.dipoles import _field, _matrix, _tangential, _tangents
+from tests.reference.fundamental import by_parity
+from tests.reference.hard_ports import AROUND, CENTRE, FIT_RINGS, RINGS, around
 
 TERMS = 6_000
 """Partial waves: with twice as many nothing changes by 1e-9 at 5 degrees and ka = 100."""
@@ -131,7 +119,7 @@ def coupled_slots(
     heights: tuple[float, ...],
     per_wavelength: float = 7.0,
 ) -> CoupledSlots:
-    """Fields of slots in a conductor; parameters as of `tests.reference.dipoles.coupled`."""
+    """Fields of slots in a conductor; parameters as of `tests.reference.hard_ports.coupled`."""
     fields = electric, field_of_moments, magnetic_of_electric
     given = depth, heights, per_wavelength
     ports, x, tangents, (values, fewer) = between(body, wavenumber, sources, points, slots_along, fields, *given)
@@ -215,8 +203,8 @@ def from_above(
     local = np.abs(X) if len(body.mirrors) == 3 else X
     spacing = 2 * np.pi / k / per_wavelength
     fit, under = (body.spread(spacing * ratio) for ratio in (1 / np.sqrt(1.7), 1.0))
-    fit = _joined([fit, *(_around(body, one, h[0] * FIT_RINGS, 2 * AROUND) for one in local)])
-    near = [_around(body, one, h[0] * RINGS, AROUND) for one in local]
+    fit = _joined([fit, *(around(body, one, h[0] * FIT_RINGS, 2 * AROUND) for one in local)])
+    near = [around(body, one, h[0] * RINGS, AROUND) for one in local]
     own = body.map(local)
     below = [Cloud(own, outward(body, own))] * len(CENTRE)
     deep = np.repeat(np.minimum(np.maximum(0.7 * h[0], 0.6 * h[0] * RINGS), depth), AROUND)
@@ -224,20 +212,13 @@ def from_above(
     inside = _joined([under, *near, *below])
     y = np.tile(inside.points - np.concatenate(depths)[:, None] * inside.normals, (2, 1))
     p = np.concatenate(_tangents(inside.normals))
-    group, axes = images(body.mirrors), list(body.mirrors)
-    odd = (group[:, axes] < 0).astype(int)
-    characters = np.where(odd @ odd.T % 2, -1.0, 1.0)
+    group = images(body.mirrors)
     seen = [sum(g[:, None] * seen_of(fit.points * g, z, moments, k) for z in pair) for g in group]
     waves = np.stack([_tangential(fit, np.asarray(field)) for field in seen])
-    blocks = [_matrix(fit, y * g, p * g, k) for g in group]
-    classes = []
-    for signs in characters:
-        matrix = sum(sign * block for sign, block in zip(signs, blocks, strict=True))
-        right = -np.tensordot(signs, waves, axes=1) / len(group)
-        classes.append(least_squares(np.asarray(matrix), np.asarray(right)))
+    strengths = by_parity(body.mirrors, [_matrix(fit, y * g, p * g, k) for g in group], waves)
     field = np.asarray(sum(field_of(x, z, moments, k) for z in pair))
-    for g, signs in zip(group, characters.T, strict=True):
-        field += dipole_field(x, y * g, p * g, k) @ np.tensordot(signs, np.stack(classes), axes=1)
+    for g, q in zip(group, strengths, strict=True):
+        field += dipole_field(x, y * g, p * g, k) @ q
     return np.asarray(field.reshape(len(x), 3, len(h), -1, each))
 
 
@@ -334,7 +315,7 @@ def slots_of_monopoles(
     heights: tuple[float, ...],
     per_wavelength: float = 7.0,
 ) -> Received:
-    """H at slots of monopoles at the sources; parameters as of `tests.reference.dipoles.coupled`."""
+    """H at slots of monopoles at the sources; parameters as of `tests.reference.hard_ports.coupled`."""
     fields = field_of_moments, _magnetic, magnetic_of_electric
     given = depth, heights, per_wavelength
     ports, x, _, both = between(body, wavenumber, sources, points, monopoles_at, fields, *given)
@@ -353,7 +334,7 @@ def monopoles_of_slots(
     heights: tuple[float, ...],
     per_wavelength: float = 7.0,
 ) -> Received:
-    """E_n at monopoles of slots at the sources; parameters as of `tests.reference.dipoles.coupled`."""
+    """E_n at monopoles of slots at the sources; parameters as of `tests.reference.hard_ports.coupled`."""
     fields = electric, electric, _field
     given = depth, heights, per_wavelength
     ports, x, tangents, both = between(body, wavenumber, sources, points, slots_along, fields, *given)
@@ -412,7 +393,7 @@ def coupled_monopoles(
     heights: tuple[float, ...],
     per_wavelength: float = 7.0,
 ) -> CoupledMonopoles:
-    """Fields of monopoles on a conductor; parameters as of `tests.reference.dipoles.coupled`."""
+    """Fields of monopoles on a conductor; parameters as of `tests.reference.hard_ports.coupled`."""
     fields = field_of_moments, field_of_moments, _field
     given = depth, heights, per_wavelength
     ports, x, _, both = between(body, wavenumber, sources, points, monopoles_at, fields, *given)
