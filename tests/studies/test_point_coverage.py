@@ -45,9 +45,10 @@ def test_parts_are_all_points_and_each_is_of_one():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("boundary", ["hard", 0.7, "pec"])
-def test_errors_of_near_and_surface_fields_are_covered_on_the_sphere(boundary):
-    found = study.row("sphere", 10.0, boundary, 10)
+# hard and conducting spheres of k = 10 are solved by the equation, which states far more than it errs by
+@pytest.mark.parametrize(("boundary", "k"), [("hard", 20.0), (0.7, 10.0), ("pec", 20.0)])
+def test_errors_of_near_and_surface_fields_are_covered_on_the_sphere(boundary, k):
+    found = study.row("sphere", k, boundary, 10)
     parts = ("lit", "close", "shadow", "axis", "on lit", "dark") + ("charge",) * (boundary == "pec")
     for part in parts:
         assert found[part] > 95, part
