@@ -1,11 +1,13 @@
-"""Questions to the method, one a file: figures of the paper, accuracy, cost.
+"""Questions to the method: figures of the paper, accuracy, cost.
 
-``FIGURES`` names the figures for the command line; each module has ``draw(path, quick)``, which writes the picture and
-returns its card: parameters, measured errors and a headline. Modules are imported when first asked for.
+``FIGURES`` names the figures for the command line; each is a function ``draw(path, quick)``, which writes the picture
+and returns its card: parameters, measured errors and a headline. Modules are imported when first asked for.
 """
 
+import inspect
 import json
 import time
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -13,28 +15,40 @@ from typing import Any
 from creeping._version import __version__
 
 FIGURES = {
-    "fig2-grid": "figure2_grid",
-    "fig3-circles": "figure3_circles",
-    "fig4-torus": "figure4_torus",
-    "fig5-weighted": "figure5_weighted",
-    "fig6-creeping": "figure6_creeping",
-    "fig6-torus": "figure6_torus",
-    "source-rays": "figure_source_rays",
-    "field-cut": "figure_field_cut",
-    "field-body": "figure_field_body",
-    "field-decay": "figure_field_decay",
-    "field-benchmarks": "figure_benchmarks",
-    "mesh-quality": "figure_mesh_quality",
-    "sweep-cross-section": "figure_cross_section",
-    "sweep-sphere-rcs": "figure_sphere_rcs",
-    "sweep-bistatic": "figure_bistatic_map",
+    "fig2-grid": "grid.six_charts",
+    "fig3-circles": "curves.circles",
+    "fig4-torus": "curves.torus",
+    "fig5-weighted": "curves.weighted",
+    "fig6-creeping": "fans.creeping",
+    "fig6-torus": "fans.torus",
+    "source-rays": "fans.sources",
+    "field-cut": "fields.cut",
+    "field-body": "fields.body",
+    "field-decay": "fields.decay",
+    "field-benchmarks": "benchmarks.published",
+    "mesh-quality": "fields.mesh_quality",
+    "sweep-cross-section": "sweeps.cross_section",
+    "sweep-sphere-rcs": "sweeps.sphere_rcs",
+    "sweep-bistatic": "sweeps.bistatic",
 }
-"""Name on the command line: module of this package."""
+"""Name on the command line: module of `studies.figures` and function."""
+
+
+def drawer(name: str) -> Callable[[Path, bool], dict[str, Any]]:
+    """Function that draws a figure."""
+    module, function = FIGURES[name].split(".")
+    found: Callable[[Path, bool], dict[str, Any]] = getattr(import_module(f"studies.figures.{module}"), function)
+    return found
 
 
 def titles() -> dict[str, str]:
     """First line of each figure's docstring, by name."""
-    return {name: _title(import_module(f"studies.{module}")) for name, module in FIGURES.items()}
+    return {name: title(drawer(name)) for name in FIGURES}
+
+
+def title(thing: object) -> str:
+    """First line of a docstring."""
+    return (inspect.getdoc(thing) or "").splitlines()[0]
 
 
 def draw(name: str, folder: str | Path, *, quick: bool = False) -> dict[str, Any]:
@@ -72,25 +86,19 @@ def draw(name: str, folder: str | Path, *, quick: bool = False) -> dict[str, Any
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InvalidInputError(f"cannot make the folder {folder}: {error}; choose another") from error
-    module = import_module(f"studies.{FIGURES[name]}")
+    function = drawer(name)
     target = folder / f"{name}.png"
     started = time.perf_counter()
     with written_aside(target) as aside:
-        found = module.draw(aside, quick)
+        found = function(aside, quick)
     card = {
         "name": name,
-        "title": _title(module),
+        "title": title(function),
         "file": target.name,
-        "headline": found["headline"],
-        "parameters": found["parameters"],
-        "error": found["error"],
+        **{key: found[key] for key in ("headline", "parameters", "error")},
         "seconds": round(time.perf_counter() - started, 2),
         "version": __version__,
         "quick": quick,
     }
     write_text(target.with_suffix(".json"), json.dumps(card, indent=1, allow_nan=False) + "\n")
     return card
-
-
-def _title(module: Any) -> str:
-    return str(module.__doc__).splitlines()[0]

@@ -1,7 +1,7 @@
 """``python -m studies`` lists the studies; ``python -m studies NAME [options]`` runs one.
 
-A figure is drawn as by ``creeping figure``: into the folder ``out``, or that of ``-o``. Any other study runs as by
-``python -m studies.NAME``, with the options that follow its name.
+A figure is drawn as by ``creeping figure``: into the folder ``out``, or that of ``-o``. Any other study prints its
+tables, with the options that follow its name; ``--help`` tells them.
 """
 
 import ast
@@ -16,22 +16,23 @@ HERE = Path(__file__).parent
 
 
 def sources() -> dict[str, Path]:
-    """File of each study by its name, figures first."""
-    figures = {name: HERE / f"{module}.py" for name, module in FIGURES.items()}
-    public = [path for path in sorted(HERE.iterdir()) if not path.name.startswith("_")]
-    modules = {p.stem: p for p in public if p.suffix == ".py" and p.stem not in FIGURES.values()}
-    packages = {p.name: p / "__init__.py" for p in public if (p / "__main__.py").exists()}
-    return figures | modules | packages
-
-
-def described(path: Path) -> str:
-    """Docstring of a file, which is not imported."""
-    return ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+    """File of each study by its name, figures first; studies are the modules in folders that can be run."""
+    figures = {name: HERE / "figures" / f"{place.split('.')[0]}.py" for name, place in FIGURES.items()}
+    runs = [path for path in sorted(HERE.glob("*/*.py")) if 'if __name__ == "__main__":' in path.read_text("utf-8")]
+    return figures | {path.parent.name if path.stem == "__main__" else path.stem: path for path in runs}
 
 
 def listing() -> str:
-    """Name and title of each study, a line each."""
-    return "\n".join(f"{name:20} {described(path).splitlines()[0]}" for name, path in sources().items())
+    """Name and title of each study, a line each; nothing is imported."""
+    lines = []
+    for name, path in sources().items():
+        at = path.with_name("__init__.py") if path.stem == "__main__" else path
+        told: ast.AST = ast.parse(at.read_text(encoding="utf-8"))
+        if name in FIGURES:
+            function = FIGURES[name].split(".")[1]
+            told = next(node for node in ast.walk(told) if getattr(node, "name", "") == function)
+        lines.append(f"{name:20} {(ast.get_docstring(told) or '').splitlines()[0]}")  # type: ignore[arg-type]
+    return "\n".join(lines)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -51,24 +52,11 @@ def main(arguments: list[str] | None = None) -> None:
         meant = f"did you mean {close[0]}?" if close else "python -m studies lists them"
         print(f"studies: there is no study {name!r}; {meant}", file=sys.stderr)
         raise SystemExit(2)
-    run(name, known[name], options)
-
-
-def run(name: str, path: Path, options: list[str]) -> None:
-    """Run a study as by ``python -m studies.NAME``."""
-    runs = path.with_name("__main__.py") if path.stem == "__init__" else path
-    text = runs.read_text(encoding="utf-8")
-    if "argparse" not in text:
-        if {"-h", "--help"} & set(options):
-            print(described(path))
-            return
-        if options and "sys.argv" not in text:
-            print(f"studies: {name} takes no options, but was given {' '.join(options)}", file=sys.stderr)
-            raise SystemExit(2)
+    module = ".".join(known[name].relative_to(HERE.parent).with_suffix("").parts)
     before = sys.argv
-    sys.argv = [str(runs), *options]
+    sys.argv = [f"python -m studies {name}", *options]
     try:
-        runpy.run_module(f"studies.{name}", run_name="__main__", alter_sys=True)
+        runpy.run_module(module, run_name="__main__", alter_sys=True)
     finally:
         sys.argv = before
 

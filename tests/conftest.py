@@ -27,7 +27,7 @@ from results_to_show import (  # noqa: F401
 
 import creeping as cr
 
-FIRST = ("README.md", "tests/studies/reference/", "tests/scatterers/", "tests/dumb_inputs/test_bad_arguments.py")
+FIRST = ("README.md", "tests/tests/reference/", "tests/scatterers/", "tests/dumb_inputs/test_bad_arguments.py")
 """Files that a run begins with, for the two workers in turn: one compiles kernels while the other needs few of them."""
 
 

@@ -278,7 +278,8 @@ def _studies() -> Any:
     if not (Path(beside) / "studies" / "__init__.py").is_file():
         raise InvalidInputError("figures are drawn by `studies`, which only the repository has; run this from a clone")
     if beside not in sys.path:
-        sys.path.append(beside)
+        # first: a figure takes its reference from `tests`, a name that other distributions leave packages of, too
+        sys.path.insert(0, beside)
     return import_module("studies")
 
 

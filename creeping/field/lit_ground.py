@@ -11,8 +11,8 @@ the mean. Where rays end or the body hides part of its line, 2 epsilon more: not
 from elsewhere on the body are known, and what currents leave inside (`creeping.field.currents.whole_body`) tells how
 large the others are; where that cannot be measured the error is a bound.
 
-Sources: [F46], [LK59]; Derivations, F16 and F20. The factors were set on four bodies (`studies._point_coverage`), F on
-x^4 + y^4 + z^4 = 1 at k = 8 and 14.
+Sources: [F46], [LK59]; Derivations, F16 and F20. The factors were set on four bodies
+(`studies.accuracy.point_coverage`), F on x^4 + y^4 + z^4 = 1 at k = 8 and 14.
 """
 
 from dataclasses import replace

@@ -23,7 +23,7 @@ Also here: what the polarisations of a conductor's creeping rays do to each othe
 with B = |ρρ''| + ρ'² and r = ρ κ_t, means of both ends.
 
 Sources: [LK59], [AS64, sec. 9.2 and 10.4]; Derivations, F20. A to D were set on four bodies
-(`studies._point_coverage`); Derivations, F14.
+(`studies.accuracy.point_coverage`); Derivations, F14.
 """
 
 from dataclasses import dataclass

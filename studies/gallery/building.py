@@ -119,11 +119,12 @@ def gather(sources: Path, cards: list[dict[str, Any]], figures: Path) -> None:
         (sources / name).mkdir(parents=True)
     (sources / "style" / "custom.css").write_text(STYLE, encoding="utf-8")
     for card in cards:
-        module = import_module(f"studies.{studies.FIGURES[card['name']]}")
+        function = studies.drawer(card["name"])
+        module = import_module(function.__module__)
         shutil.copy(figures / card["file"], sources / "figures")
         thumbnail(figures / card["file"], sources / "gallery" / "thumbs" / card["file"])
-        path = f"studies/{studies.FIGURES[card['name']]}.py"
-        page = figure_page(card, module.__doc__ or "", path, inspect.getsource(module))
+        path = f"studies/figures/{Path(str(module.__file__)).name}"
+        page = figure_page(card, inspect.getdoc(function) or "", path, inspect.getsource(module))
         (sources / "gallery" / f"{card['name']}.md").write_text(page, encoding="utf-8")
     (sources / "gallery" / "index.md").write_text(gallery_page(cards), encoding="utf-8")
 
@@ -172,7 +173,7 @@ def figure_page(card: dict[str, Any], docstring: str, path: str, source: str) ->
     card : dict
         Sidecar of `studies.draw`.
     docstring, path, source : str
-        Of the study: its docstring, the name of its file, what stands in it.
+        Of the function that draws it: its docstring, the name of its file, what stands in that.
 
     Returns
     -------
@@ -223,7 +224,7 @@ def gallery_page(cards: list[dict[str, Any]]) -> str:
         [
             "# Gallery",
             "",
-            "Each figure is drawn by a study, a module of `studies`, which measures what it shows. Its page gives the",
+            "Each figure is drawn by a function of `studies.figures`, which measures what it shows. Its page gives the",
             "question, the picture, the numbers of its sidecar, and the source.",
             "",
             "```{list-table}",

@@ -10,7 +10,7 @@ import shared_bodies as sc
 from command_line import creeping, table
 
 import creeping as cr
-from studies.reference import sphere
+from tests.reference import sphere
 
 
 def test_run_writes_everything_it_names(tmp_path, capsys):

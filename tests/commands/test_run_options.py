@@ -11,7 +11,7 @@ import creeping as cr
 from creeping.commands import run_field
 from creeping.errors import InvalidInputError
 from creeping.field.forward import lobe_step
-from studies.reference import sphere
+from tests.reference import sphere
 
 X = (1.0, 0.0, 0.0)
 

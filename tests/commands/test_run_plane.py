@@ -10,7 +10,7 @@ from command_line import ran, table
 from creeping.commands import run_plane
 from creeping.commands.run_plane import parse_plane
 from creeping.errors import InvalidInputError
-from studies.reference import sphere
+from tests.reference import sphere
 
 
 def test_planes_are_written(tmp_path, capsys):

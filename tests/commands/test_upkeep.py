@@ -11,7 +11,7 @@ import trimesh
 from command_line import creeping
 
 import creeping as cr
-from studies._meshes import geodesic_sphere
+from tests.exact_meshes import geodesic_sphere
 
 
 def said(capsys, *words):

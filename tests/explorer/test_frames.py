@@ -79,7 +79,7 @@ def test_a_newer_wish_ends_the_work():
 
 
 def test_the_cut_of_a_sphere_is_near_the_partial_waves():
-    from studies.reference import sphere
+    from tests.reference import sphere
 
     # along z: theta of the cut is the angle from the forward direction
     _, _, found = found_of(sc.Sphere(), REQUEST.changed(theta=0.0, length=6.5, wavenumber=20.0))

@@ -14,8 +14,8 @@ from creeping.explorer.text import legend, wave_note
 from creeping.explorer.wave import ENDED, WAVE_COLOURS, strengths, wave_colours
 from creeping.geometry.triangulation import triangulate
 from creeping.plotting.coupling_pictures import at_phase
-from studies.reference import sphere
 from tests.patience import until
+from tests.reference import sphere
 
 REQUEST = ViewRequest(theta=50.0, phi=40.0, rays=64, length=2.0, spacing=0.25, wavenumber=30.0, boundary="hard")
 SPAN = (-50.0, 5.0)

@@ -6,7 +6,7 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.field.point_result import FieldStatus
-from studies.reference import dipoles, sphere
+from tests.reference import dipoles, sphere
 
 HEIGHTS = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0)
 D = np.array([0.0, 0.0, 1.0])

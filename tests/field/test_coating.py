@@ -7,7 +7,7 @@ import shared_bodies as sc
 import creeping as cr
 from creeping.field import on_body
 from creeping.field.special.fock import surface_function
-from studies.reference import near_source, sphere
+from tests.reference import sphere, sphere_admittance
 
 K = 25.0
 ETA = (0.4 + 0.1j, 0.25)
@@ -36,7 +36,7 @@ def fan():
 
 def test_reference_is_the_series_of_a_constant_admittance():
     points = spread(60)
-    found = near_source.surface_field(8.0, 1.0, D, (0.7, 0.0), points)
+    found = sphere_admittance.surface_field(8.0, 1.0, D, (0.7, 0.0), points)
     assert np.allclose(found, sphere.surface_field(8.0, 1.0, points @ D, 0.7), atol=1e-12)
 
 
@@ -47,7 +47,7 @@ def test_field_on_the_body_is_that_of_the_exact_sphere(fan, judged, monkeypatch)
         monkeypatch.setattr(on_body, "affordable", lambda *_: False)
     points = spread(150)
     found = cr.surface_field(fan, points, wavenumber=K, boundary=BOUNDARY)
-    exact = near_source.surface_field(K, 1.0, D, ETA, points)
+    exact = sphere_admittance.surface_field(K, 1.0, D, ETA, points)
     off = np.abs(found.values - exact)
     assert found.ok.any() and np.max(off[found.ok] if judged else off) < 0.02  # of the incident wave; 0.03 asked for
     assert np.mean(off <= found.error) > 0.9
@@ -57,16 +57,16 @@ def test_field_on_the_body_is_that_of_the_exact_sphere(fan, judged, monkeypatch)
 @pytest.mark.slow
 def test_a_step_of_the_admittance():
     """Expansions smear it, and the equation of the body stands for them: u has a kink there, and its slope a jump."""
-    zones, k, r = near_source.Zones((0.2, 0.9 - 0.3j), (0.15,)), 8.0, spread(250)
+    zones, k, r = sphere_admittance.Zones((0.2, 0.9 - 0.3j), (0.15,)), 8.0, spread(250)
     ball = sc.Sphere()
     fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), cr.shadow_line(ball, direction=D), length=3.3, n_rays=48)
-    exact = near_source.far_field(k, 1.0, D, zones, r)
+    exact = sphere_admittance.far_field(k, 1.0, D, zones, r)
     far = cr.far_field(fan, r, wavenumber=k, boundary=STEP)
     assert set(far.method) == {"equation"}
     assert np.max(np.abs(far.total - exact)) < 0.003 * np.max(np.abs(exact))
     assert np.mean(np.abs(far.total - exact) <= far.error) > 0.85
     u = cr.surface_field(fan, r, wavenumber=k, boundary=STEP)
-    off = np.abs(u.values - near_source.surface_field(k, 1.0, D, zones, r))
+    off = np.abs(u.values - sphere_admittance.surface_field(k, 1.0, D, zones, r))
     assert set(u.method) == {"equation"} and np.all(u.ok)
     assert np.quantile(off, 0.95) < 0.025 and np.max(off) < 0.08 and np.mean(off <= u.error) > 0.85
 
@@ -77,7 +77,7 @@ def test_a_step_is_of_the_equation(fan):
 
 def test_zones_of_one_admittance_are_its_series():
     points = spread(60)
-    found = near_source.surface_field(8.0, 1.0, D, near_source.Zones((0.7, 0.7), (0.3,)), points)
+    found = sphere_admittance.surface_field(8.0, 1.0, D, sphere_admittance.Zones((0.7, 0.7), (0.3,)), points)
     assert np.allclose(found, sphere.surface_field(8.0, 1.0, points @ D, 0.7), atol=1e-12)
 
 
@@ -86,7 +86,7 @@ def test_far_and_near_fields_are_those_of_the_exact_sphere(fan):
     boundary = BOUNDARY
     r = spread(200)
     far = cr.far_field(fan, r, wavenumber=K, boundary=boundary)
-    exact = near_source.far_field(K, 1.0, D, ETA, r)
+    exact = sphere_admittance.far_field(K, 1.0, D, ETA, r)
     assert np.max(np.abs(far.total - exact)) < 0.005 * np.max(np.abs(exact))
     assert np.mean(np.abs(far.total - exact) <= far.error) > 0.95
     # far away the field near the body is the far field

@@ -13,9 +13,8 @@ from creeping.errors import InvalidInputError
 from creeping.field.point_result import FieldStatus
 from creeping.files import write_touchstone
 from creeping.geometry.surface import normal, project
-from studies.reference import stored
-from studies.reference.dipoles import sphere_coupling
-from studies.reference.slots import (
+from tests.reference import stored
+from tests.reference.antennas import (
     plane_antennas,
     plane_monopoles,
     plane_slots,
@@ -23,6 +22,7 @@ from studies.reference.slots import (
     sphere_monopoles,
     sphere_slots,
 )
+from tests.reference.hard_ports import sphere_coupling
 
 KINDS = ("ports", "slots", "monopoles", "antennas")
 DEGREES = {

@@ -7,8 +7,8 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from studies.field_coverage import bodies
-from studies.reference.dipoles import frames
+from studies.accuracy.bodies import bodies
+from tests.reference.dipoles import frames
 
 D = np.array([0.37, 0.51, 0.776]) / np.linalg.norm([0.37, 0.51, 0.776])
 SCANNED = ("triaxial", "slender", "flat", "egg", "twisted", "peanut")

@@ -8,7 +8,7 @@ import creeping as cr
 from creeping.errors import InvalidInputError
 from creeping.field import on_body
 from creeping.field.equation import solving
-from studies import joints
+from studies.accuracy import joints
 
 PILL = sc.Capsule(1.0, 4.0)
 

@@ -11,7 +11,7 @@ from creeping.field.boundary import HARD
 from creeping.field.equation import solving
 from creeping.field.marching.fan_waves import fan_waves
 from creeping.rays.shedding import shed_on
-from studies.reference import clouds, fundamental, sphere, stored
+from tests.reference import clouds, fundamental, sphere, stored
 
 
 def fan_of(body, direction, length, n_rays=96):

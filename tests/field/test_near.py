@@ -9,7 +9,7 @@ from creeping.errors import InvalidInputError
 from creeping.field.near import FINE
 from creeping.field.point_result import FieldStatus
 from creeping.shadow.attachment import occluded
-from studies.reference import sphere
+from tests.reference import sphere
 
 D = np.array([0.0, 0.0, 1.0])
 

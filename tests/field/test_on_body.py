@@ -9,7 +9,7 @@ from creeping.field import on_body
 from creeping.field.equation import solving
 from creeping.field.lit_ground import convex
 from creeping.field.point_result import FieldStatus
-from studies.reference import clouds, fundamental, sphere
+from tests.reference import clouds, fundamental, sphere
 
 
 def fan_of(length=4.0):

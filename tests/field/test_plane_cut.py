@@ -5,7 +5,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from studies.reference import sphere
+from tests.reference import sphere
 
 K = 10.0
 

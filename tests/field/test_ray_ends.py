@@ -7,7 +7,7 @@ import shared_bodies as sc
 import creeping as cr
 from creeping.field.boundary import HARD, scalar_boundaries
 from creeping.field.far_geometry import far_geometry
-from studies.reference import sphere
+from tests.reference import sphere
 
 ANGLES = np.radians(np.arange(0.0, 181.0, 2.0))
 ALONG = np.stack([np.sin(ANGLES), 0 * ANGLES, np.cos(ANGLES)], axis=1)

@@ -9,7 +9,7 @@ import creeping as cr
 from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT, HARD, SOFT, Boundary, scalar_boundaries
 from creeping.field.reflected import plane_reflection, reflected_amplitude, reflected_error, reflection
 from creeping.rays.specular import specular_points
-from studies.reference import sphere
+from tests.reference import sphere
 
 D = np.array([0.3, 0.5, 0.81]) / np.linalg.norm([0.3, 0.5, 0.81])
 WALL = Boundary("impedance", 0.4 + 0.3j)

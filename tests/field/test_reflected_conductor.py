@@ -6,7 +6,7 @@ import shared_bodies as sc
 from scipy.special import h1vp, hankel1, jv, jvp
 
 import creeping as cr
-from studies.reference import stored
+from tests.reference import stored
 
 
 def unit(*v):

@@ -7,7 +7,7 @@ import shared_bodies as sc
 import creeping as cr
 from creeping.geometry.surface import normal
 from creeping.rays.port_rays import tangent_frames
-from studies.reference import stored
+from tests.reference import stored
 
 BODY, K = sc.Ellipsoid(0.75, 0.9, 1.15), 12.0
 

@@ -7,9 +7,9 @@ import shared_bodies as sc
 import creeping as cr
 from creeping.field.on_body import ray_magnitude
 from creeping.geometry.surface import normal
-from studies.reference import clouds
-from studies.reference.near_source import beside_source
-from studies.reference.sphere import source_on_sphere
+from tests.reference import clouds
+from tests.reference.fundamental import beside_source
+from tests.reference.sphere import source_on_sphere
 
 # relative errors, %, at 5 to 50 degrees behind the line: distance in radii, k a
 SPHERE = {

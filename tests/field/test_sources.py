@@ -5,8 +5,8 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from studies.field_coverage import bodies
-from studies.reference import fundamental, sphere
+from studies.accuracy.bodies import bodies
+from tests.reference import fundamental, sphere
 
 K = 25.0
 TOWARDS = cr.fibonacci_directions(3)

@@ -8,7 +8,7 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.rays.uncertain_body import coarse_fan
-from studies._meshes import on_body
+from tests.exact_meshes import on_body
 
 D, K = (0.3, 0.2, 0.9), 20.0
 LENGTH, RAYS = 3.0, 96

@@ -8,7 +8,7 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.files import write_sofa
-from studies.reference import sphere
+from tests.reference import sphere
 
 sofar = pytest.importorskip("sofar")
 RADIUS, SPEED = 0.0875, 343.0

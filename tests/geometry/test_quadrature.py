@@ -10,7 +10,7 @@ from creeping.geometry import quadrature, tile_rules
 from creeping.geometry.curvature import gaussian_curvature
 from creeping.geometry.quadrature import body_nodes, inner_points, nearest_points, node_count
 from creeping.geometry.triangulation import quadrilaterals
-from studies.field_coverage import bodies
+from studies.accuracy.bodies import bodies
 
 BODIES = {
     "sphere": sc.Sphere(radius=2.0),

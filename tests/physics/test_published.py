@@ -13,8 +13,8 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from studies.reference.modal_equation import scatter_by_modes
-from studies.reference.revolution import spheroid_profile
+from tests.reference.modal_equation import scatter_by_modes
+from tests.reference.revolution import spheroid_profile
 
 TABLES = Path(__file__).parents[3] / "shared" / "benchmarks"
 pytestmark = pytest.mark.skipif(not TABLES.is_dir(), reason="the published tables are not beside the repository")

@@ -5,8 +5,8 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from studies import field_sphere
-from studies.reference import sphere
+from studies.accuracy import field_sphere
+from tests.reference import sphere
 
 FACTOR = 1.5
 

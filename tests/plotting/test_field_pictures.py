@@ -8,7 +8,7 @@ import creeping as cr
 from creeping.errors import InvalidInputError
 from creeping.plotting import currents_picture, decay_picture, field_pictures, surface_field_picture
 from creeping.plotting.field_pictures import surface_levels
-from studies.reference import sphere
+from tests.reference import sphere
 
 K = 30.0
 

@@ -8,7 +8,7 @@ from fake_fields import far_of
 
 import creeping as cr
 from creeping.plotting.pictures import new_figure
-from studies.reference import sphere
+from tests.reference import sphere
 
 
 def test_cross_section_of_a_sphere_in_dbsm(ball_cut):

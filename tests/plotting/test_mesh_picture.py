@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from creeping.plotting.mesh_picture import HEIGHT, WIDTH, MeshValues, mesh_picture
-from studies._meshes import geodesic_sphere
+from tests.exact_meshes import geodesic_sphere
 
 
 def pixels(path):

@@ -8,7 +8,7 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.geodesics.equations import natural_horizon
-from studies._meshes import torus_grid
+from tests.exact_meshes import torus_grid
 
 
 def torus(folder):

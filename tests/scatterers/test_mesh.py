@@ -19,7 +19,7 @@ import scatterers as sc
 from creeping.geometry.surface import normal, project
 from scatterers.spline import cache as _fit_cache
 from scatterers.spline.cloud import FitReport
-from studies._meshes import capsule, geodesic_sphere, on_body, scattered, torus_grid
+from tests.exact_meshes import capsule, geodesic_sphere, on_body, scattered, torus_grid
 
 NAMES = ("ellipsoid", "torus", "twisted")
 POINTS, RAYS, LENGTH = 1000, 40, 2.0

@@ -7,7 +7,7 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from studies._meshes import geodesic_sphere
+from tests.exact_meshes import geodesic_sphere
 
 
 def as_mesh(vertices, triangles):

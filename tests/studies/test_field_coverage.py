@@ -5,8 +5,8 @@ import pytest
 import shared_bodies as sc
 from body_checks import directions
 
-from studies import field_coverage as coverage
-from studies.reference import clouds, dipoles
+from studies.accuracy import field_coverage as coverage
+from tests.reference import clouds, dipoles
 
 
 def test_the_frames_of_the_conducting_ball(rng):
@@ -25,11 +25,11 @@ def test_row_of_the_table(name, boundary, monkeypatch):
         # the other bodies take seconds to examine
         monkeypatch.setattr(coverage, "bodies", lambda: {"sphere": (sc.Sphere(), clouds.ellipsoid(1, 1, 1), 0.2)})
         monkeypatch.setattr(coverage, "INCIDENCES", 1)
-    rows = np.array(coverage.row(name, 8.0, boundary, 108))
-    assert rows.shape == (coverage.INCIDENCES, 10)
-    extinction, true, cover = rows[:, :3].T
-    assert np.all((true / extinction < 2.5) & (extinction / true < 2.5))
-    assert np.all(cover > 90)
-    # off, and neither flagged nor covered, per cent: of a conductor 3 of its 2400 amplitudes
-    assert rows[:, 7].max() < 0.2
-    assert rows[:, 8].max() == 0
+    rows = coverage.rows(name, 8.0, boundary, 108)
+    assert len(rows) == coverage.INCIDENCES
+    for row in rows:
+        assert row["true"] / row["ext"] < 2.5 and row["ext"] / row["true"] < 2.5
+        assert row["cover"] > 90
+        # off, and neither flagged nor covered, per cent: of a conductor 3 of its 2400 amplitudes
+        assert row["silent"] < 0.2
+        assert row["false"] == 0

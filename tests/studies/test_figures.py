@@ -7,7 +7,7 @@ import pytest
 
 import creeping as cr
 import studies
-from studies import figure3_circles
+from studies.figures import curves
 
 MAP = 1e-4
 """Rms of one g_T0: the tolerance of a quick map; Algorithm 1 on the grid of Figure 2 does better."""
@@ -107,7 +107,7 @@ def test_failed_figure_leaves_nothing(tmp_path, monkeypatch):
 
     with pytest.raises(cr.InvalidInputError, match="fig3-circles"):
         studies.draw("fig7", tmp_path / "out")
-    monkeypatch.setattr(figure3_circles, "draw", fail)
+    monkeypatch.setattr(curves, "circles", fail)
     with pytest.raises(cr.CreepingError, match=r"fig3-circles\.png"):
         studies.draw("fig3-circles", tmp_path)
     assert not list(tmp_path.iterdir())

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from studies import flow_speed
+from studies.cost import flow_speed
 
 ELLIPSOID = ("ellipsoid",)
 
@@ -12,16 +12,14 @@ ELLIPSOID = ("ellipsoid",)
 def test_long_leaps_compare_equal_errors():
     (row,) = flow_speed.long_leaps(ELLIPSOID, count=64, samples=100)
     assert row["body"] == "ellipsoid"
-    for flow in ("map", "order 8", "heyoka", "scipy"):
-        cost, error = row[flow], row[f"{flow} error"]
-        assert flow == "heyoka" or not math.isnan(cost)
-        assert math.isnan(cost) or (cost > 0 and 0 < error <= 1e-6)
+    for flow in ("map", "order 8", "scipy"):
+        assert row[flow] > 0 and 0 < row[f"{flow} error"] <= 1e-6
     assert row["pencils"] > 0
     assert row["T0"] > 0 and row["MB"] > 0 and row["grid"].startswith("1x1x")
 
 
 def test_break_even_needs_a_map_that_is_faster():
-    rows = flow_speed.break_even(ELLIPSOID, tuned=(1e6,), count=64)
+    rows = list(flow_speed.break_even(ELLIPSOID, tuned=(1e6,), count=64))
     assert [row["tuned for"] for row in rows] == [1e6]
     for row in rows:
         assert 0 < row["map error"] <= 1e-6
@@ -29,11 +27,10 @@ def test_break_even_needs_a_map_that_is_faster():
         assert row["order 8 error"] <= 2 * row["map error"]
         assert row["build s"] > 0
         assert (row["rays"] == math.inf) == (row["order 8"] <= row["map"])
-        assert row["least"] == "*"
 
 
 def test_requested_tolerances_are_met():
-    rows = flow_speed.requested(ELLIPSOID, exponents=(3, 6), samples=400)
+    rows = list(flow_speed.requested(ELLIPSOID, exponents=(3, 6), samples=400))
     assert [row["requested"] for row in rows] == [1e-3, 1e-6]
     for row in rows:
         assert 0 < row["median"] <= row["achieved"] <= row["worst"] <= row["requested"]

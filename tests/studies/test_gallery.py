@@ -17,6 +17,7 @@ import studies
 from creeping.commands.main import app
 from creeping.sweeping.studyfile.study import parse_study
 from studies import __main__ as command
+from studies import tables
 from studies.gallery import building
 
 ROOT = Path(__file__).parents[2]
@@ -57,8 +58,8 @@ def test_there_are_the_pages():
 
 @pytest.mark.parametrize("page", PAGES, ids=by_name)
 def test_dotted_names_are_there(page):
-    names = {code for code in inline(page) if re.fullmatch(r"(creeping|scatterers|studies)(\.\w+)+", code)}
-    names |= set(re.findall(r"\b(?:creeping|scatterers|studies)(?:\.\w+)+", "\n".join(blocks(page, "text"))))
+    names = {code for code in inline(page) if re.fullmatch(r"(creeping|scatterers|studies|tests)(\.\w+)+", code)}
+    names |= set(re.findall(r"\b(?:creeping|scatterers|studies|tests)(?:\.\w+)+", "\n".join(blocks(page, "text"))))
     for name in sorted(names):
         parts = name.split(".")
         found, depth = importlib.import_module(parts[0]), 1
@@ -123,36 +124,57 @@ def test_commands_and_studies_are_understood(page):
 
 
 def study_is_there(words):
-    """Assert that ``studies...`` can be run, with these options."""
-    name = words[0].removeprefix("studies").removeprefix(".")
-    if not name:
-        assert len(words) == 1 or words[1] in command.sources(), words
+    """Assert that ``studies NAME``, the gallery or the fuzzing can be run, with these options and tables."""
+    if words[0] in ("studies.gallery", "tests.fuzz"):
+        known = text_of(ROOT.joinpath(*words[0].split("."), "__main__.py"))
+    elif len(words) == 1:
         return
-    source = command.sources()[name]
-    text = text_of(source if source.stem == name else source.with_name("__main__.py"))
-    assert all(f'"{word}"' in text for word in words[1:] if word.startswith("-")), words
+    else:
+        known = text_of(command.sources()[words[1]])
+        for table in words[words.index("--tables") + 1 :] if "--tables" in words else ():
+            assert f"def {table}(" in known, words
+        known += text_of(Path(tables.__file__))
+    assert all(f'"{word}"' in known for word in words[1:] if word.startswith("-")), words
 
 
 def test_all_studies_are_listed():
     done = subprocess.run([sys.executable, "-m", "studies"], cwd=ROOT, capture_output=True, text=True, check=True)
     rows = dict(line.split(maxsplit=1) for line in done.stdout.split("\n\n")[0].splitlines())
     folder = Path(studies.__file__).parent
-    modules = {path.stem for path in folder.glob("*.py") if not path.stem.startswith("_")}
-    assert set(rows) == set(studies.FIGURES) | modules - set(studies.FIGURES.values()) | {"gallery", "fuzz"}
+    texts = {path: text_of(path) for part in ("accuracy", "cost", "figures") for path in (folder / part).glob("*.py")}
+    runs = {path.stem for path, text in texts.items() if "tables.main(" in text}
+    assert len(runs) > 10
+    assert set(rows) == set(studies.FIGURES) | runs | {"gallery"}
     assert {name: rows[name] for name in studies.FIGURES} == studies.titles()
-    for name, source in command.sources().items():
-        runs = source if source.stem != "__init__" else source.with_name("__main__.py")
-        assert name in studies.FIGURES or 'if __name__ == "__main__":' in text_of(runs), name
 
 
 def test_a_study_gets_its_options(monkeypatch):
     seen = []
     monkeypatch.setattr(command.runpy, "run_module", lambda name, **_: seen.append((name, sys.argv[1:])))
     before = sys.argv
-    command.main(["flow_speed", "--quick", "--tables", "1"])
+    command.main(["flow_speed", "--quick", "--tables", "sizes"])
     command.main(["gallery", "-o", "site"])
-    assert seen == [("studies.flow_speed", ["--quick", "--tables", "1"]), ("studies.gallery", ["-o", "site"])]
+    assert seen == [
+        ("studies.cost.flow_speed", ["--quick", "--tables", "sizes"]),
+        ("studies.gallery.__main__", ["-o", "site"]),
+    ]
     assert sys.argv is before
+
+
+def test_tables_are_printed_as_they_are_asked_for(capsys):
+    def numbers(count=3):
+        """Numbers and their squares."""
+        return ({"number": f"{k}", "square": float(k * k)} for k in range(count))
+
+    def others():
+        """Others."""
+        raise AssertionError("not asked for")
+
+    tables.main((numbers, others), {"numbers": {"count": 2}}, arguments=["--tables", "numbers", "--quick"])
+    lines = [line.split() for line in capsys.readouterr().out.splitlines() if line]
+    assert lines == [["Numbers", "and", "their", "squares."], ["number", "square"], ["0", "0"], ["1", "1"]]
+    with pytest.raises(SystemExit):
+        tables.main((numbers,), arguments=["--tables", "cubes"])
 
 
 @pytest.mark.slow
@@ -172,9 +194,10 @@ def test_site_of_one_figure(tmp_path):
     source = re.search(rf'<img [^>]*src="\.\./(_images/{CHEAP}[^"]*\.png)"', page)
     assert source and (folder / source[1]).exists()
     read, card = squeezed(html.unescape(re.sub(r"<[^>]+>", "", page))), json.loads(card)
-    module = importlib.import_module(f"studies.{studies.FIGURES[CHEAP]}")
-    below = module.__doc__.partition("\n")[2].replace("`", "")
-    for told in (card["headline"], card["title"].rstrip("."), text_of(Path(module.__file__)), below):
+    function = studies.drawer(CHEAP)
+    below = function.__doc__.partition("\n")[2].replace("`", "")
+    source = text_of(Path(sys.modules[function.__module__].__file__))
+    for told in (card["headline"], card["title"].rstrip("."), source, below):
         assert squeezed(told) in read
     assert f"Drawn in {card['seconds']:g} s." in read
     assert all(parameter.replace("_", " ") in read for parameter in card["parameters"])

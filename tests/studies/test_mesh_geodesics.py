@@ -2,11 +2,11 @@
 
 import pytest
 
-from studies import mesh_geodesics
+from studies.accuracy import fitted_bodies
 
 
 def test_the_fitted_body_is_a_hundred_times_more_exact():
-    (row,) = mesh_geodesics.rows(("ellipsoid",), (2000,))
+    (row,) = fitted_bodies.geodesics(("ellipsoid",), (2000,))
     assert row["fitted 95 %"] < 1e-5
     if "unfolded" in row:
         pytest.skip("potpourri3d is not installed")

@@ -3,12 +3,13 @@
 import numpy as np
 from tolerances import FRACTION, LINE_LENGTH
 
-from studies import figure_bistatic_map as bistatic
-from studies import sweep_lines, sweep_speed
+from studies.cost import sweep_lines, sweep_speed
+from studies.figures import sweeps
 
 
 def test_lines_agree_with_both_references():
-    (cost,), (finest,), (panels,) = sweep_lines.tables(("peanut",), count=60, every=10).values()
+    tables = (sweep_lines.lines, sweep_lines.finest, sweep_lines.panels)
+    (cost,), (finest,), (panels,) = (table(("peanut",), count=60, every=10) for table in tables)
     assert cost["ok"] + cost["near singular"] + cost["followed one by one"] == 60
     assert cost["need mesh 3"] <= cost["need mesh 2"] < 30
     assert cost["curves seen"] == "1 3"
@@ -21,7 +22,7 @@ def test_lines_agree_with_both_references():
 
 
 def test_fans_carry_their_errors():
-    rows = sweep_speed.fans(("ellipsoid",), count=8, checked=4)
+    rows = list(sweep_speed.fans(("ellipsoid",), count=8, checked=4))
     assert [row["flow"] for row in rows] == ["map", "map", "order 8", "order 8"]
     for row in rows:
         assert row["per s"] > 0 and row["line us"] > 0
@@ -35,8 +36,8 @@ def test_reciprocity_finds_what_is_not():
     # f of d and r alike in (d, r) and (-r, -d)
     even = np.cos(alpha[:, None] - beta) + 2j + 0.3 * (np.cos(alpha)[:, None] - np.cos(beta))
     everywhere = np.ones(even.shape, dtype=bool)
-    found = bistatic.reciprocity(even, everywhere)
+    found = sweeps.reciprocity(even, everywhere)
     assert found["pairs"] == n * (n - 1) / 2 and found["unresolved"] == 0
     assert found["largest_over_largest"] < 1e-12
     odd = even + 0.1 * (np.cos(alpha)[:, None] + np.cos(beta))
-    assert bistatic.reciprocity(odd, everywhere)["median_relative"] > 0.01
+    assert sweeps.reciprocity(odd, everywhere)["median_relative"] > 0.01

@@ -7,7 +7,7 @@ import shared_bodies as sc
 import creeping as cr
 from creeping.field.labelled import power
 from creeping.sweeping.echoes import echo_of
-from studies.reference import sphere
+from tests.reference import sphere
 
 RADIUS = 0.15
 

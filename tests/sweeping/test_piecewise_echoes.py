@@ -5,7 +5,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from studies.reference import stored
+from tests.reference import stored
 
 RADIUS, HALF, K = 0.4, 0.5, 20.0
 CAPSULE = sc.Capsule(radius=RADIUS, length=2 * (HALF + RADIUS))

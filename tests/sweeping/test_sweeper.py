@@ -11,7 +11,7 @@ from creeping.rays.tracer import RayTracer
 from creeping.shadow.many import shadow_lines
 from creeping.sweeping.request import sweep_request
 from creeping.sweeping.sweeper import Sweeper
-from studies.reference import sphere
+from tests.reference import sphere
 
 TRIAXIAL, TWISTED = sc.Ellipsoid(1.2, 0.8, 0.6), sc.TwistedEllipsoid()
 DIRECTIONS = np.array([[0.3, 0.5, 0.812], [-0.7, 0.2, 0.4], [0.1, -0.8, 0.5]])

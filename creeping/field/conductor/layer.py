@@ -44,7 +44,7 @@ LEFT_OUT, LEFT_OUT_ACROSS = 0.1, 0.3
 the cube of the heights they span."""
 
 LIT_LEVEL, DARK_LEVEL, SHAPE = 2.3, 4.6, 2.3
-"""Factors L and S of the error, set on the first four bodies of `studies._point_coverage`."""
+"""Factors L and S of the error, set on the first four bodies of `studies.accuracy.point_coverage`."""
 ELECTRIC, MAGNETIC = slice(0, 3), slice(3, 6)
 """Where E and H stand among six components."""
 

@@ -31,7 +31,7 @@ since the scattered field is f_rms/R, rms over all directions, and f(d)/R = k f_
 it is no more than the incident wave itself.
 
 Sources: [F46], [LK59], [CK13, sec. 3.2]; Derivations, F16 and F17; [CK13, sec. 3.2]; Derivations, F17 and F20. L and S
-were set on four bodies (`studies._point_coverage`).
+were set on four bodies (`studies.accuracy.point_coverage`).
 """
 
 # help() shows names of types instead of what they stand for

@@ -99,7 +99,7 @@ class Rule(NamedTuple):
         Longest sides, in wavelengths.
     lacks : (float, float)
         What tiles lack at edges, as `Tiles.lacks`: of cubes of 12 to 3072 irregular triangles, k = 5 and 9, against
-        `studies.reference.mirrored_box`, each within a factor of 1.5; of five nodes it is read off.
+        `tests.reference.mirrored_box`, each within a factor of 1.5; of five nodes it is read off.
     poorer : float
         What a node of it is worth on a body with edges: fields there err by 0.8 and 0.3 % of the largest with
         triangles of one and two nodes, by 0.25, 0.06 and 0.01 % with squares.

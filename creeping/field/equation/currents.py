@@ -55,14 +55,14 @@ ON_BODY, OFF_BODY = 10.0, 2.0
 the incident wave."""
 LEAST, LEAST_NEAR = 2e-5, 5e-5
 """What is left inside, at least, for the far field, where errors of tiles cancel, and on the body and near it: a few
-times what is left of the equation and what integrals over tiles err by (`studies.edges`)."""
+times what is left of the equation and what integrals over tiles err by (`studies.accuracy.edges`)."""
 UNRESOLVED = 2.0
 """Error by what tiles do not resolve, in what two ways to the same value differ by."""
 SMOOTHED = 0.04
 """Share of what polynomials of tiles do not resolve that the equation leaves in currents away from edges; on six bodies
 0.01 to 0.03 (`tests.field.equation.test_solution`)."""
 LEVELS = {"hard": 1.1, "soft": 0.9, "impedance": 0.9, "conductor": 1.1}
-"""Error of the far field over what is found of it, with which it holds in 95 of 100 directions (`studies.edges`)."""
+"""Error of the far field over what is found of it, to hold in 95 of 100 directions (`studies.accuracy.edges`)."""
 CLOSEST = 1e-6
 """Distance from an edge, over that of the nodes next to it, at least: on the edge itself currents are infinite."""
 LOW = 2e-3

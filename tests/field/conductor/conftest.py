@@ -5,7 +5,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from studies.reference import clouds, dipoles, sphere
+from tests.reference import clouds, dipoles, sphere
 
 OBLIQUE = np.array([0.36, 0.48, 0.8])
 

@@ -12,7 +12,7 @@ from creeping.field.marching.fan_waves import fan_waves
 from creeping.field.strip_waves import modes_on_strip
 from creeping.geometry.quadrature import body_nodes
 from creeping.rays.status import RayStatus
-from studies import conductor_coverage
+from studies.accuracy import point_coverage
 
 K = 20.0
 
@@ -69,6 +69,6 @@ def test_no_points_have_no_current(ball):
 @pytest.mark.slow
 def test_the_twisted_ellipsoid_is_covered():
     """Against electric dipoles, an incidence that no factor was set on: half of it was without a current."""
-    found = conductor_coverage.row("twisted", K, 41)
-    assert found["J dark"] > 93 and found["J dark error"] < 20
+    found = point_coverage.row("twisted", K, "pec", 41)
+    assert found["dark"] > 93 and found["dark error"] < 20
     assert found["on"] < 25

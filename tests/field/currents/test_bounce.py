@@ -7,8 +7,8 @@ import creeping as cr
 import scatterers as sc
 from creeping.field.currents.bounce import LOW, received, received_vectors
 from creeping.geometry.quadrature import body_nodes
-from studies.field_coverage import bodies
-from studies.reference import dipoles, fundamental
+from studies.accuracy.bodies import bodies
+from tests.reference import dipoles, fundamental
 
 K = 9.0
 

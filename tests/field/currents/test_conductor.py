@@ -6,7 +6,7 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.field.far_result import dyads
-from studies.reference import clouds, dipoles, sphere
+from tests.reference import clouds, dipoles, sphere
 
 OBLIQUE = np.array([0.36, 0.48, 0.8])
 

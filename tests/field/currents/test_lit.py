@@ -5,7 +5,7 @@ import pytest
 
 from creeping.field.boundary import HARD, SOFT, Boundary
 from creeping.field.currents.lit import lit_currents
-from studies.reference import section, sphere
+from tests.reference import section, sphere
 
 # largest error as a share of the largest current, by k: about one and a half times what is reached
 BOUNDARIES = {

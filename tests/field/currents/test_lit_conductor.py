@@ -5,7 +5,7 @@ import pytest
 
 from creeping.field.boundary import HARD, SOFT
 from creeping.field.currents.lit import lit_conductor, lit_currents
-from studies.reference import section, sphere
+from tests.reference import section, sphere
 
 NOTHING = np.zeros(80)
 

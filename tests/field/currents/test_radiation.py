@@ -14,7 +14,7 @@ from creeping.field.currents.radiation import (
     transformed,
 )
 from creeping.geometry.quadrature import body_nodes
-from studies.reference import sphere
+from tests.reference import sphere
 
 K = 9.0
 D = np.array([0.48, -0.6, 0.64])

@@ -6,7 +6,7 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.errors import InvalidInputError
-from studies.reference import clouds, fundamental, sphere, stored
+from tests.reference import clouds, fundamental, sphere, stored
 
 OBLIQUE = np.array([0.36, 0.48, 0.8])
 

@@ -7,12 +7,12 @@ import creeping as cr
 import scatterers as sc
 from creeping.field.equation import solving
 from creeping.geometry.quadrature import body_nodes
-from studies.field_coverage import DIPOLE_DEPTHS, bodies
-from studies.joints import CASES, spread
-from studies.reference import dipoles, fundamental, sphere, stored
-from studies.reference.generatrix import pieces_profile
-from studies.reference.modal_conductor import scatter_conductor
-from studies.reference.revolution import Revolved
+from studies.accuracy.bodies import DIPOLE_DEPTHS, bodies
+from studies.accuracy.joints import CASES, spread
+from tests.reference import dipoles, fundamental, sphere, stored
+from tests.reference.generatrix import pieces_profile
+from tests.reference.modal_conductor import scatter_conductor
+from tests.reference.revolution import Revolved
 
 K = 10.0
 AXES = (0.9, 0.55, 0.7)

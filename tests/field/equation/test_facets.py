@@ -9,7 +9,7 @@ import scatterers as sc
 from creeping.field.boundary import HARD
 from creeping.field.equation.body_tiles import RULES, facet_tiles
 from creeping.geometry.patches import facet_patches, halved, sides_of
-from studies.reference import sphere, stored
+from tests.reference import sphere, stored
 
 CUBE = stored.read("edged_cube")
 D, R = CUBE["incident"].real, CUBE["directions"].real

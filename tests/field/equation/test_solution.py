@@ -8,7 +8,7 @@ import creeping as cr
 import scatterers as sc
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.equation import solving
-from studies.reference import sphere
+from tests.reference import sphere
 
 D = np.array([[0.0, 0.0, 1.0], [0.6, 0.0, -0.8]])
 R = cr.fibonacci_directions(60)

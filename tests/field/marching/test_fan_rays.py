@@ -9,7 +9,7 @@ from creeping.field.boundary import HARD, SOFT
 from creeping.field.marching.fan_rays import fan_profiles
 from creeping.field.marching.layer import march_rays
 from creeping.field.marching.plan import MarchStatus
-from studies.reference import sphere
+from tests.reference import sphere
 
 BANDS = ((0.3, 0.6), (0.6, 0.9), (0.9, 1.2))
 

@@ -8,7 +8,7 @@ from creeping.field.boundary import ELECTRIC_SOFT, HARD, SOFT, Boundary
 from creeping.field.marching.layer import march_rays
 from creeping.field.marching.plan import MarchStatus
 from creeping.field.marching.profile import RayProfiles
-from studies.reference import section
+from tests.reference import section
 
 S = np.concatenate([np.linspace(-1.55, 0, 40), np.linspace(0, 3.6, 91)[1:]])
 

@@ -17,7 +17,7 @@ from scatterers.pieces.joints import Cuts, cut, jointed
 from scatterers.triangles.jets import osculating_jets
 from scatterers.triangles.quality import assess, jumps_at, noise_at_most
 from scatterers.triangles.topology import edges_of
-from studies._meshes import capsule, geodesic_sphere, slivers, torus_grid
+from tests.exact_meshes import capsule, geodesic_sphere, slivers, torus_grid
 
 PILL, CONE = sc.Capsule(0.8, 3.1), sc.ConeSphere(1.0, 3.3)
 MESHES = {

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from scatterers.pieces.regions import regions_of
-from studies._meshes import geodesic_sphere, torus_grid
+from tests.exact_meshes import geodesic_sphere, torus_grid
 
 
 def wedge(sections=24):

@@ -14,7 +14,7 @@ from body_checks import volume
 from scatterers.triangles.files import TriangleMesh, read_mesh
 from scatterers.triangles.quality import Choice
 from scatterers.triangles.topology import crossings
-from studies.fuzz import seeds
+from tests.fuzz import seeds
 
 BALL = trimesh.creation.icosphere(2)
 VERTICES, FACES = np.array(BALL.vertices), np.array(BALL.faces)

@@ -3,7 +3,7 @@
 import pytest
 
 import scatterers as sc
-from studies.fuzz import seeds
+from tests.fuzz import seeds
 
 
 def read(tmp_path, name, data):

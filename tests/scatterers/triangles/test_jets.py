@@ -8,7 +8,7 @@ from body_checks import rms, unit
 
 import scatterers as sc
 from scatterers.triangles.jets import osculating_jets
-from studies._meshes import geodesic_sphere, slivers, torus_grid
+from tests.exact_meshes import geodesic_sphere, slivers, torus_grid
 
 ELLIPSOID, TORUS = sc.Ellipsoid(1.2, 0.8, 0.8), sc.Torus()
 

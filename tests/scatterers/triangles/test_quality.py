@@ -10,7 +10,7 @@ import scatterers as sc
 from scatterers.triangles.files import TriangleMesh
 from scatterers.triangles.jets import osculating_jets
 from scatterers.triangles.quality import MeshQuality, assess
-from studies._meshes import almond, capsule, geodesic_sphere, noisy, slivers, torus_grid
+from tests.exact_meshes import almond, capsule, geodesic_sphere, noisy, slivers, torus_grid
 
 make = trimesh.creation
 

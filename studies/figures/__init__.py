@@ -1,0 +1,1 @@
+"""Figures, each a function that draws it and tells what it measured."""
