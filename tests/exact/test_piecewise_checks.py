@@ -51,7 +51,9 @@ def test_wrong_signs_are_a_share_of_the_area_and_rcs_says_so(tmp_path):
     echo = echo_of(0.5, 0.25)
     extra = echo_report.write_results(tmp_path, echo, {}, body, "rod", pictures=False)[1]
     said = dict.fromkeys(("error_db_median", "otherwise_by", "by_currents", "values", "unresolved"))
-    said |= echo.summary() | extra | {"body": "rod", "seconds": 0.0, "files": [], "failed_incidences": 0}
+    said |= (
+        echo.summary() | extra | {"body": "rod", "boundary": "pec", "seconds": 0.0, "files": [], "failed_incidences": 0}
+    )
     said["validity"] = {"least_k_rho": None, "largest_transverse": None}
     assert "beside 1.1 % of its area F has the wrong sign" in echo_report.readable(said, tmp_path)
 

@@ -71,6 +71,7 @@ def test_a_step_of_the_admittance():
     assert np.quantile(off, 0.95) < 0.025 and np.max(off) < 0.08 and np.mean(off <= u.error) > 0.85
 
 
+@pytest.mark.slow
 def test_a_step_is_of_the_equation(fan):
     assert cr.surface_currents(fan, wavenumber=4.0, boundary=STEP).solved
 

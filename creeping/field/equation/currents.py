@@ -440,18 +440,19 @@ class ConductorTileCurrents(_OnTiles, ConductorCurrents):
 
     def charge_on_body(self, points: ArrayLike) -> tuple[ComplexArray, FloatArray]:
         """n.E and its error, as `on_body`: (m, p) each."""
-        return self._charge_at(self._places(points))
+        places = self._places(points)
+        assert places.own is not None
+        values = self._charge_at(places)
+        # the potential of what tiles do not resolve of J, which changes sign along the body
+        potential = (self.wavenumber * self.matrix.tiles.reach[places.own[0]] * super()._unresolved_at(places).T).T
+        return values, np.hypot(self._error_on(places, self.charge, values, 1.0), potential)
 
-    def _charge_at(self, places: Places) -> tuple[ComplexArray, FloatArray]:
-        """n.E and its error at places of tiles."""
+    def _charge_at(self, places: Places) -> ComplexArray:
+        """n.E at places of tiles."""
         matrix, d = self.matrix.soft_one, self.direction[None]
         J, electric = self.values[:, :, None], self.incident_electric[None]
         given = twice_normal(matrix, places, J, d, electric)[:, 0]
-        values = given - matrix.received(places, self.charge, "slope")
-        assert places.own is not None
-        # the potential of what tiles do not resolve of J, which changes sign along the body
-        potential = (self.wavenumber * matrix.tiles.reach[places.own[0]] * super()._unresolved_at(places).T).T
-        return values, np.hypot(self._error_on(places, self.charge, values, 1.0), potential)
+        return np.asarray(given - matrix.received(places, self.charge, "slope"))
 
     def scattered_electric(self, points: ArrayLike) -> ComplexArray:
         """Scattered E at points (m, 3), L, at any distance from the body: (m, 3, p)."""
@@ -480,7 +481,7 @@ class ConductorTileCurrents(_OnTiles, ConductorCurrents):
         return error
 
     def _unresolved_at(self, places: Places) -> FloatArray:
-        of_charge = self._unresolved(places, self.charge, self._charge_at(places)[0])
+        of_charge = self._unresolved(places, self.charge, self._charge_at(places))
         return np.maximum(super()._unresolved_at(places), of_charge)
 
     @property

@@ -23,6 +23,27 @@ def flat():
     return cr.solve(CYLINDER, np.concatenate([d, -d]), wavenumber=3.0, boundary="hard")
 
 
+@pytest.mark.parametrize("boundary", ["soft", "hard"])
+def test_stated_errors_at_each_height_are_those_of_the_series(boundary, rng):
+    """k = 10, where tiles are as wide as they are for any larger k."""
+    k, d = 10.0, D[1]
+    found = cr.solve(sc.Sphere(), d, wavenumber=k, boundary=boundary)
+    n = rng.normal(size=(60, 3))
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    if boundary == "soft":
+        fields = [(found.surface_field(n), sphere.surface_derivative(k, 1.0, n @ d, "soft"))]
+    else:
+        fields = [(found.surface_field(n), sphere.surface_field(k, 1.0, n @ d, "hard"))]
+    for height in (1e-3, 0.03, 0.1, 0.3, 1.0, 3.0):
+        x = (1 + height) * n
+        fields.append((found.near_field(x), sphere.total_field(k, 1.0, x, d, boundary)))
+    for field, exact in fields:
+        off = np.abs(field.values - exact)
+        assert np.mean(off <= field.error) > 0.95
+        # on the body, and up to 3 radii off it
+        assert np.median(field.error / off) < 15
+
+
 @pytest.mark.parametrize("boundary", ["soft", "hard", cr.ImpedanceBoundary(ETA)])
 def test_sphere_against_its_series_far_near_and_on_it(boundary):
     k = 4.0

@@ -103,7 +103,9 @@ def test_sums_do_not_depend_on_where_the_body_is(rng):
     assert rms(sums.values(np.ones(300, dtype=complex)) - exact) < SPLIT * rms(exact)
 
 
-@pytest.mark.parametrize("boundary", ["soft", "hard", cr.ImpedanceBoundary(0.5 + 0.2j), "pec"])
+@pytest.mark.parametrize(
+    "boundary", ["soft", "hard", cr.ImpedanceBoundary(0.5 + 0.2j), pytest.param("pec", marks=pytest.mark.slow)]
+)
 def test_products_are_those_of_the_matrix(boundary, rng):
     """On the body and beneath it, of scalar fields next to edges too."""
     k, kinds = 3.0, scalar_boundaries(boundary)
