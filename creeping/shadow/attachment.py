@@ -20,9 +20,14 @@ from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.incident import REMEDY, headings, openings, optical_paths, spherical
-from creeping.geometry.surface import Surface
+from creeping.geometry.parts import is_faceted, why_no_rays
+from creeping.geometry.piecewise import is_convex, is_piecewise
+from creeping.geometry.surface import Surface, size
 from creeping.kernels.threads import in_slices
 from creeping.shadow.status import NO_RAY
+
+ABOVE = 1e-5
+"""Height of points just above nodes of tiles, in body sizes: the polynomials of tiles may pass under the body."""
 
 
 class Arc(NamedTuple):
@@ -189,3 +194,24 @@ def occluded(body: Surface, points: FloatArray, direction: FloatArray, reach: Fl
 
         in_slices(run, len(points), seconds=1e-5)
     return hidden
+
+
+def is_lit(body: Any, points: FloatArray, normals: FloatArray, direction: FloatArray) -> BoolArray:
+    """Whether the wave comes straight to points of the body with normals (m, 3): (m,)."""
+    lit = np.asarray(normals @ direction < 0)
+    if not (is_piecewise(body) and is_convex(body)):
+        above = points[lit] + ABOVE * size(body) * normals[lit]
+        lit[lit] = ~_hidden(body, above, direction)
+    return lit
+
+
+def _hidden(body: Any, points: FloatArray, direction: FloatArray) -> BoolArray:
+    """Whether a body of any kind stands before points (m, 3) of the wave (m,)."""
+    if not why_no_rays(body):
+        return occluded(body, points, direction)
+    if is_faceted(body):
+        return np.asarray(body.hidden(points, direction))
+    found = np.zeros(len(points), dtype=bool)
+    for number, part in enumerate(body.parts):
+        found |= _hidden(part, body.own(number, points), direction @ body.turns[number])
+    return found

@@ -78,7 +78,9 @@ def test_forward_lobe_is_that_of_the_outline():
         found = cr.far_field(fan, [d], wavenumber=40.0, boundary="hard", method="rays")
         lobe = 40.0 * area / (2 * np.pi)
         assert abs(found.total[0] - 1j * lobe) < 0.02 * lobe + found.error[0]
-        assert abs(found.forward[0] + found.reflected[0] - 1j * lobe) < 0.01 * lobe
+        # optics integrate all of the lit side: the lobe is in the reflected part, and not known apart
+        assert np.isnan(found.forward[0])
+        assert abs(found.reflected[0] - 1j * lobe) < 0.01 * lobe
 
 
 def test_cylinder_broadside():

@@ -157,7 +157,7 @@ def _solved_on(currents: ConductorTileCurrents, points: FloatArray, left: FloatA
         J, error = values[:, :, i], np.maximum(found.error[:, i], ON_BODY * float(share))
         one, lit = measured_field(J, error, "equation", "extinction"), found.lit[:, None]
         served.append(replace(one, wave=np.where(lit, J, 0.0), creeping=np.where(lit, 0.0, J)))
-    return OnConductor(served, *currents.charge_on_body(points))
+    return OnConductor(served, *currents.charge_on_body(points, found.values))
 
 
 def _by_expansions(

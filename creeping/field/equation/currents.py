@@ -37,11 +37,9 @@ from creeping.field.equation.matrix import Matrix, Places
 from creeping.field.equation.tiles import Tiles, gauss
 from creeping.field.far_result import spherical_frame
 from creeping.geodesics.bundle import as_points
-from creeping.geometry.parts import is_faceted, why_no_rays
-from creeping.geometry.piecewise import is_convex, is_piecewise
 from creeping.geometry.quadrature import box_points
 from creeping.geometry.surface import Surface, size
-from creeping.shadow.attachment import occluded
+from creeping.shadow.attachment import is_lit
 
 APART = 0.12
 """Distance from the fine nodes, in wavelengths, from which sums over them are fields: what they err by falls off like
@@ -51,24 +49,22 @@ THIN = (DEPTH, SHALLOW, 0.05, 0.02, 0.005)
 DEEPEST = 50
 """Points inside a body that is thinner everywhere."""
 ON_BODY, OFF_BODY = 10.0, 2.0
-"""Error of currents at a point and of the field next to the body, and of that far from it, by what they leave inside of
-the incident wave."""
+"""Error of currents at a point and of the field next to the body, and of that far from it, by what they leave inside;
+series judge them at each height (`tests.field.equation.test_solution`)."""
 LEAST, LEAST_NEAR = 2e-5, 5e-5
 """What is left inside, at least, for the far field, where errors of tiles cancel, and on the body and near it: a few
 times what is left of the equation and what integrals over tiles err by (`studies.accuracy.edges`)."""
 UNRESOLVED = 2.0
 """Error by what tiles do not resolve, in what two ways to the same value differ by."""
 SMOOTHED = 0.04
-"""Share of what polynomials of tiles do not resolve that the equation leaves in currents away from edges; on six bodies
-0.01 to 0.03 (`tests.field.equation.test_solution`)."""
+"""Share of what polynomials of tiles do not resolve that the equation leaves in currents away from edges: 0.01 to 0.03
+on six bodies, k = 8 to 22. What is stated with it the same tests judge."""
 LEVELS = {"hard": 1.1, "soft": 0.9, "impedance": 0.9, "conductor": 1.1}
 """Error of the far field over what is found of it, to hold in 95 of 100 directions (`studies.accuracy.edges`)."""
 CLOSEST = 1e-6
 """Distance from an edge, over that of the nodes next to it, at least: on the edge itself currents are infinite."""
 LOW = 2e-3
 """Height over the size of a tile from which integrals over its parts, halved twelve times at most, are good."""
-ABOVE = 1e-5
-"""Height of points just above the nodes, in body sizes: polynomials of tiles may pass under the body."""
 
 
 def twice_normal(
@@ -100,27 +96,6 @@ def scattered_electric(matrix: Matrix, points: FloatArray, J: ComplexArray, q: C
         places = Places.at(points, np.broadcast_to(along, points.shape))
         field[:, axis] -= 0.5 * matrix.received(places, q, "slope")
     return field
-
-
-def lit_ground(body: Any, points: FloatArray, normals: FloatArray, direction: FloatArray) -> BoolArray:
-    """Whether the wave comes straight to points of the body with normals (m, 3): (m,)."""
-    lit = np.asarray(normals @ direction < 0)
-    if not (is_piecewise(body) and is_convex(body)):
-        above = points[lit] + ABOVE * size(body) * normals[lit]
-        lit[lit] = ~_hidden(body, above, direction)
-    return lit
-
-
-def _hidden(body: Any, points: FloatArray, direction: FloatArray) -> BoolArray:
-    """Whether a body of any kind stands before points (m, 3) of the wave (m,)."""
-    if not why_no_rays(body):
-        return occluded(body, points, direction)
-    if is_faceted(body):
-        return np.asarray(body.hidden(points, direction))
-    found = np.zeros(len(points), dtype=bool)
-    for number, part in enumerate(body.parts):
-        found |= _hidden(part, body.own(number, points), direction @ body.turns[number])
-    return found
 
 
 def twice_incident(
@@ -171,15 +146,19 @@ class _OnTiles(SurfaceCurrents):
 
     def _at(self, places: Places) -> OnBody:
         """The current at places of tiles."""
+        values = self._values_at(places)
+        lit = is_lit(self.body, places.points, places.normals, self.direction)
+        error = self._error_on(places, self.values, values, self.wavenumber if self.boundary.kind == "soft" else 1.0)
+        return OnBody(values, error, places.points, places.normals, lit)
+
+    def _values_at(self, places: Places) -> ComplexArray:
+        """What the equation gives at places of tiles: (m, ...)."""
         soft = self.boundary.kind == "soft"
         sums = self._received(places, self.values, "slope" if soft else "double")
         magnetic = self._incident[None] if self._incident.ndim else np.zeros((1, 3, 0))
         wave = twice_incident(self.boundary, places, self.direction[None], self.wavenumber, magnetic)
         values = _vectors(places, wave[:, :, 0]) if self._incident.ndim else wave[:, 0]
-        lit = lit_ground(self.body, places.points, places.normals, self.direction)
-        values = values - sums if soft else values + sums
-        error = self._error_on(places, self.values, values, self.wavenumber if soft else 1.0)
-        return OnBody(values, error, places.points, places.normals, lit)
+        return values - sums if soft else values + sums
 
     def _places(self, points: ArrayLike) -> Places:
         """Places of the body nearest to points (m, 3), L."""
@@ -194,7 +173,7 @@ class _OnTiles(SurfaceCurrents):
     def _error_on(self, places: Places, nodes: ComplexArray, values: ComplexArray, unit: float) -> FloatArray:
         """Error of values that the equation gives at places (m, ...): (m,), of a conductor (m, p).
 
-        What polynomials do not resolve changes sign across a tile, so that on ground that curves little its integral is
+        What polynomials do not resolve changes sign across a tile: where the surface curves little its integral is
         small; across an edge it is not.
         """
         assert places.own is not None
@@ -299,7 +278,7 @@ class _OnTiles(SurfaceCurrents):
 
     def _unresolved_at(self, places: Places) -> FloatArray:
         """What the polynomials of tiles do not resolve at places of them."""
-        return self._unresolved(places, self.values, self._at(places).values)
+        return self._unresolved(places, self.values, self._values_at(places))
 
     @property
     def _left_inside(self) -> FloatArray:
@@ -438,13 +417,14 @@ class ConductorTileCurrents(_OnTiles, ConductorCurrents):
         """n.E at the nodes (n, p), in units of the incident E."""
         return np.asarray(self.charges() @ self.mix)
 
-    def charge_on_body(self, points: ArrayLike) -> tuple[ComplexArray, FloatArray]:
-        """n.E and its error, as `on_body`: (m, p) each."""
+    def charge_on_body(self, points: ArrayLike, J: ComplexArray | None = None) -> tuple[ComplexArray, FloatArray]:
+        """n.E and its error, as `on_body`: (m, p) each; of the current there (m, 3, p) if it is known."""
         places = self._places(points)
         assert places.own is not None
         values = self._charge_at(places)
+        unresolved = self._unresolved(places, self.values, self._values_at(places) if J is None else J)
         # the potential of what tiles do not resolve of J, which changes sign along the body
-        potential = (self.wavenumber * self.matrix.tiles.reach[places.own[0]] * super()._unresolved_at(places).T).T
+        potential = (self.wavenumber * self.matrix.tiles.reach[places.own[0]] * unresolved.T).T
         return values, np.hypot(self._error_on(places, self.charge, values, 1.0), potential)
 
     def _charge_at(self, places: Places) -> ComplexArray:

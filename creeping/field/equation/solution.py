@@ -22,7 +22,7 @@ from creeping.field.conductor_result import ConductorCurrent, ConductorField, Fi
 from creeping.field.currents.far_sum import far_by_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation.columns import solved_columns
-from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents, charges, lit_ground, twice_incident
+from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents, charges, twice_incident
 from creeping.field.equation.matrix import Matrix
 from creeping.field.equation.tiles import Tiles
 from creeping.field.far_result import FarField, incident_mix, spherical_frame
@@ -31,6 +31,7 @@ from creeping.geodesics.bundle import as_points
 from creeping.geometry.checks import unit_of
 from creeping.geometry.parts import inside as inside_of
 from creeping.geometry.surface import Surface, size
+from creeping.shadow.attachment import is_lit
 
 TOUCHING = 1e-6
 """Distance from the body, in its sizes, up to which a point is on it."""
@@ -118,7 +119,7 @@ class Solution:
                 travel=np.broadcast_to(d, tiles.points.shape),
                 values=self._values[at],
                 change=self._change[at],
-                lit=lit_ground(self.body, tiles.points, tiles.normals, d),
+                lit=is_lit(self.body, tiles.points, tiles.normals, d),
                 rim=np.zeros((0, 3)),
                 rim_length=0.0,
                 unserved=0.0,
@@ -197,7 +198,7 @@ class Solution:
         if np.any(on):
             found = currents.on_body(x[on])
             n = found.normals[:, :, None]
-            scattered[0, on] = n * currents.charge_on_body(x[on])[0][:, None] - incident[0, on]
+            scattered[0, on] = n * currents.charge_on_body(x[on], found.values)[0][:, None] - incident[0, on]
             scattered[1, on] = np.cross(found.values, n, axis=1) - incident[1, on]
         size = np.max(np.linalg.norm(incident + scattered, axis=2), axis=0)
 
@@ -225,7 +226,8 @@ class Solution:
         """
         y, single = as_points(points), polarisation is not None
         currents = self._polarised("conductor_current", incidence, polarisation)
-        found, charge = currents.on_body(y), currents.charge_on_body(y)
+        found = currents.on_body(y)
+        charge = currents.charge_on_body(y, found.values)
         lit = found.lit[:, None, None]
 
         def lanes(values: np.ndarray) -> Any:
