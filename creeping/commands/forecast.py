@@ -8,7 +8,7 @@ from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked_across
 from creeping.field.boundary import BoundaryLike, boundary_name
-from creeping.field.equation.solving import ASKED, SECONDS, is_large, plan_of
+from creeping.field.equation.effort import ASKED, is_large, plan_of
 from creeping.field.tmatrix.computing import expected
 from creeping.field.validity_range import EDGE, body_validity
 from creeping.geodesics.equations import points_of_charts
@@ -22,6 +22,7 @@ SMALL, LARGE = 0.03, 3e3
 """Wavelengths across beyond which a unit is asked about: a thousandth of 30, and a thousand times 3."""
 KINDS = {"soft": "soft (pressure release)", "hard": "hard (rigid)", "pec": "perfect conductor"}
 SOLVED = "errors of 0.01 to 1 % of the largest amplitude (0.1 dB)"
+COARSE = "errors of 0.1 to 3 % of the largest amplitude (0.3 dB), for want of time: coarse tiles and few steps"
 """Of the equation and the T-matrix: what they stated on bodies with edges and without."""
 
 
@@ -123,16 +124,18 @@ def forecast(
     if smooth and is_large(shape, top, boundary) and method != "equation":
         nodes, refused, equation = 0, "it is too large", ""
     else:
-        solved = plan_of(shape, top, boundary, ASKED if method == "equation" else SECONDS, incidences=count)
+        solved = plan_of(shape, top, boundary, ASKED if method == "equation" else None, incidences=count)
+        if without and solved.refused:
+            solved = plan_of(shape, top, boundary, ASKED, incidences=count)
         # nodes grow with the area in square wavelengths, and what pairs of them take with the square of that
         share = float(np.sum((k / top) ** 4))
         nodes, refused = solved.nodes, solved.refused
         takes = _takes(share * solved.seconds, solved.memory)
-        equation = f"the integral equation between {nodes} nodes, {takes}, {SOLVED}"
+        equation = f"the integral equation between {nodes} nodes, {takes}, {COARSE if solved.effort.coarse else SOLVED}"
     if not refused and (not smooth or method == "equation"):
         by = equation
     elif without:
-        by = f"nothing within half a minute: {refused}; creeping.solve(..., seconds=) takes as long as it may"
+        by = f"nothing within five minutes: {refused}; creeping.solve(..., seconds=) takes as long as it may"
     elif has_edges(shape):
         by = f"rays and physical optics, which err by several per cent (0.5 dB): the equation is not solved, {refused}"
     elif not refused and not _reached(shape, k):

@@ -18,14 +18,14 @@ from creeping.field.body_currents import cached_currents
 from creeping.field.boundary import BoundaryLike, parse_boundary
 from creeping.field.comparison import cross_section_decibels
 from creeping.field.equation.solution import Solution
-from creeping.field.equation.solving import ASKED, solve
+from creeping.field.equation.solving import solved_alone
 from creeping.field.far import far_field
 from creeping.field.far_result import FarField, turned_to_azimuth
 from creeping.field.forward import lobe_step
 from creeping.field.uncertainty import far_field_uncertainty
 from creeping.field.validity_range import Validity, validity
 from creeping.files.ffe import grid_directions
-from creeping.geometry.directions import unit_direction
+from creeping.geometry.directions import unit_direction, unit_directions
 from creeping.geometry.incident import REMEDY
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface
@@ -128,8 +128,8 @@ class Job:
     def solved(self, body: Any, direction: ArrayLike, tell: Callable[[str], None]) -> tuple[Solution, FarField, float]:
         """The same of a body without rays, by its integral equation, whose solution comes first."""
         started = time.perf_counter()
-        asked: dict[str, Any] = {"wavenumber": self.wavenumber, "boundary": self.boundary}
-        solution = solve(body, direction, seconds=ASKED, progress=tell, **asked)
+        d = unit_directions(direction, "direction").reshape(-1, 3)
+        solution = solved_alone(body, d, self.wavenumber, self.boundary, tell=tell)
         far = self._turned(solution.far_field(self.directions))
         return solution, far, round(time.perf_counter() - started, 2)
 

@@ -22,7 +22,8 @@ from creeping.field.currents.radiation import grid_cells, transformed
 from creeping.field.currents.whole_body import POINTS as POINTS_INSIDE
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
-from creeping.field.equation.solving import Solved, asked_solution, expected_seconds_of, is_large, solution_for
+from creeping.field.equation.effort import expected_seconds_of, is_large
+from creeping.field.equation.solving import Solved, asked_solution, solution_for
 from creeping.geometry.arguments import one_of
 from creeping.geometry.piecewise import has_edges, is_piecewise
 from creeping.geometry.quadrature import node_count

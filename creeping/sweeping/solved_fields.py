@@ -17,7 +17,7 @@ from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import InvalidInputError, SingularIncidenceError, SurfaceError
 from creeping.field.arguments import UNRESOLVED
 from creeping.field.boundary import BoundaryLike, parse_boundary
-from creeping.field.equation.solving import ASKED, solve, solve_together, too_much
+from creeping.field.equation.solving import solve_together, solved_alone
 from creeping.field.far import far_field
 from creeping.field.far_result import FarField
 from creeping.geodesics.integrator import ErrorEstimate
@@ -98,12 +98,7 @@ class SolvedSweeper:
         for k, wavenumber in enumerate(request.wavenumbers):
             for name, which, suffix in request.problems:
                 boundary = parse_boundary(name)
-                if why := too_much(body, wavenumber, boundary, ASKED):
-                    raise InvalidInputError(
-                        f"the integral equation is not solved at wavenumber {wavenumber:g}: {why}; give a lower "
-                        "frequency, or a coarser mesh"
-                    )
-                solution = solve(body, d, wavenumber=wavenumber, boundary=boundary, seconds=np.inf)
+                solution = solved_alone(body, d, wavenumber, boundary, fine=request.method == "equation")
                 for row in range(len(d)):
                     observers = np.array(request.observation) if bistatic else -d[row : row + 1]
                     field = FieldArrays.of(solution.far_field(observers, row), 1)

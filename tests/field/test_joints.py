@@ -7,7 +7,7 @@ import shared_bodies as sc
 import creeping as cr
 from creeping.errors import InvalidInputError
 from creeping.field import on_body
-from creeping.field.equation import solving
+from creeping.field.equation import effort
 from studies.accuracy import joints
 
 PILL = sc.Capsule(1.0, 4.0)
@@ -68,7 +68,7 @@ def test_each_ray_crosses_joints():
 
 def test_the_unit_of_length_is_no_matter(monkeypatch):
     monkeypatch.setattr(on_body, "affordable", lambda *_: False)
-    monkeypatch.setattr(solving, "SECONDS", 0.0)
+    monkeypatch.setattr(effort, "SECONDS", 0.0)
     points = np.array([[1.0, 0.0, 0.1], [0.0, 0.6, 1.05], [0.0, -1.0, -0.2]])
     d = (0.9, 0.0, 0.4)
     small, large = (
@@ -83,7 +83,7 @@ def test_the_unit_of_length_is_no_matter(monkeypatch):
 
 
 def test_what_has_no_march_is_refused_where_the_equation_is_too_large(monkeypatch):
-    monkeypatch.setattr(solving, "SECONDS", 0.0)
+    monkeypatch.setattr(effort, "SECONDS", 0.0)
     fan = fan_of(PILL, (0.9, 0.0, 0.4))
     for ask in (
         lambda: cr.surface_currents(fan, wavenumber=24.0, boundary="pec"),
@@ -123,7 +123,7 @@ def test_along_the_axis_the_equation_starts_from_nothing(boundary, k, most):
 def test_along_the_axis_where_the_equation_is_too_large(monkeypatch):
     """Rays and optics far away, and elsewhere words or a status, no foreign error."""
     monkeypatch.setattr(on_body, "affordable", lambda *_: False)
-    monkeypatch.setattr(solving, "SECONDS", 0.0)
+    monkeypatch.setattr(effort, "SECONDS", 0.0)
     fan = fan_of(PILL, (0, 0, 1), n_rays=16)
     far = cr.far_field(fan, [(0, 0, 1.0)], wavenumber=5.0, boundary="hard")
     assert far.method.tolist() == ["rays+optics"] and np.all(np.isfinite(far.total))
@@ -136,7 +136,7 @@ def test_along_the_axis_where_the_equation_is_too_large(monkeypatch):
 
 
 def test_a_tip_has_no_value(monkeypatch):
-    monkeypatch.setattr(solving, "SECONDS", 0.0)
+    monkeypatch.setattr(effort, "SECONDS", 0.0)
     cone = sc.ConeSphere(1.0, 4.0)
     u = cr.surface_field(fan_of(cone, (0.3, 0, -1), n_rays=16), [(0, 0, 3.0)], wavenumber=12.0, boundary="soft")
     assert u.values[0] == 0 and np.isinf(u.error[0]) and not u.ok[0]

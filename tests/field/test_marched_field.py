@@ -8,7 +8,7 @@ import creeping as cr
 from creeping.field import on_body
 from creeping.field.beams import beam_sums
 from creeping.field.boundary import HARD
-from creeping.field.equation import solving
+from creeping.field.equation import effort
 from creeping.field.marching.fan_waves import fan_waves
 from creeping.rays.shedding import shed_on
 from tests.reference import clouds, fundamental, sphere, stored
@@ -35,7 +35,7 @@ def ball():
 def test_focus_behind_a_sphere(ball, k, limit, boundary, monkeypatch):
     """Per cent of the field at the focus, up to 30 degrees from it: rays alone are infinite there."""
     # by rays also where the equation would be solved
-    monkeypatch.setattr(solving, "SECONDS", 0.0)
+    monkeypatch.setattr(effort, "SECONDS", 0.0)
     theta = np.radians([0.0, 0.1, 0.5, 2.0, 5.0, 10.0, 20.0, 30.0])
     points = np.stack([np.sin(theta), 0 * theta, np.cos(theta)], axis=-1)
     exact = (sphere.surface_derivative if boundary == "soft" else sphere.surface_field)(k, 1.0, points[:, 2], boundary)
@@ -73,7 +73,7 @@ def test_where_rays_have_ended(monkeypatch):
     reference = fundamental.scatter(clouds.twisted_ellipsoid(), k, d[None], "hard", depth=0.12, per_wavelength=5.0)
     exact = reference.total(points)[:, 0]
     # as where the integral equation would cost too much
-    monkeypatch.setattr(solving, "SECONDS", 0.0)
+    monkeypatch.setattr(effort, "SECONDS", 0.0)
     found = cr.surface_field(fan, points, wavenumber=k, boundary="hard")
     monkeypatch.setattr(on_body, "marches", lambda *_: False)
     modes = cr.surface_field(fan, points, wavenumber=k, boundary="hard")
@@ -92,7 +92,7 @@ def test_ground_that_the_body_hides():
     x, exact = known["points"], known["values"]
     with pytest.MonkeyPatch.context() as patch:
         # as where the integral equation would cost too much
-        patch.setattr(solving, "SECONDS", 0.0)
+        patch.setattr(effort, "SECONDS", 0.0)
         found = cr.surface_field(fan, x, wavenumber=k, boundary="hard")
         patch.setattr(on_body, "marches", lambda *_: False)
         modes = cr.surface_field(fan, x, wavenumber=k, boundary="hard")

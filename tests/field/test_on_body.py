@@ -6,7 +6,7 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.field import on_body
-from creeping.field.equation import solving
+from creeping.field.equation import effort
 from creeping.field.lit_ground import convex
 from creeping.field.point_result import FieldStatus
 from tests.reference import clouds, fundamental, sphere
@@ -96,7 +96,7 @@ def test_each_ray_goes_on_where_it_detaches():
 def test_ground_without_rays_is_not_zero_in_silence(monkeypatch):
     """By modes: what is marched goes on there (tests/field/test_marched_field.py), and the equation knows all."""
     monkeypatch.setattr(on_body, "marches", lambda *_: False)
-    monkeypatch.setattr(solving, "SECONDS", 0.0)
+    monkeypatch.setattr(effort, "SECONDS", 0.0)
     peanut = sc.Implicit("(x**2 + y**2 + z**2 + 0.64)**2 - 2.56*x**2 - 0.9**4")
     line = cr.shadow_line(peanut, (1, 0.05, 0.02))
     fan = cr.launch(cr.DirectFlow(peanut), line, length=3.0, n_rays=48)
@@ -129,7 +129,7 @@ def torus():
 @pytest.mark.slow
 def test_what_comes_from_elsewhere_is_bounded_where_it_cannot_be_measured(torus, monkeypatch):
     # as where the integral equation would cost too much
-    monkeypatch.setattr(solving, "SECONDS", 0.0)
+    monkeypatch.setattr(effort, "SECONDS", 0.0)
     x = [(-1.5, 0.0, 0.0), (1 + 0.5 * np.cos(2.5), 0.0, -0.5 * np.sin(2.5))]
     low, high = (cr.surface_field(torus, x, wavenumber=k, boundary="hard") for k in (40.0, 420.0))
     assert low.method.tolist() == high.method.tolist() == ["lit", "lit"]

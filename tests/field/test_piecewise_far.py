@@ -8,7 +8,7 @@ from scipy.special import j1
 
 import creeping as cr
 from creeping.errors import InvalidInputError
-from creeping.field.equation import solving
+from creeping.field.equation import effort
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +106,7 @@ def test_what_is_lost_makes_directions_unresolved(facing):
 
 
 def test_other_fields_are_refused_by_name_where_the_equation_costs_too_much(monkeypatch):
-    monkeypatch.setattr(solving, "SECONDS", 0.0)
+    monkeypatch.setattr(effort, "SECONDS", 0.0)
     fan = fan_of(cut_sphere(0.5), (1, 0, 0.3), n_rays=8, length=3.0)
     for ask in (
         lambda: cr.near_field(fan, [(0, 0, 3.0)], wavenumber=20.0, boundary="soft"),

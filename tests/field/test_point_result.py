@@ -8,7 +8,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.field.equation import solving
+from creeping.field.equation import effort
 from creeping.field.point_result import FieldStatus, judged, measured_field
 
 K = 20.0
@@ -136,7 +136,7 @@ def test_values_of_the_size_of_their_error_are_not_ok():
 
 @pytest.mark.parametrize("boundary", ["soft", "hard"])
 def test_the_axis_of_a_torus_is_unresolved_without_the_equation(boundary, monkeypatch):
-    monkeypatch.setattr(solving, "SECONDS", 0.0)
+    monkeypatch.setattr(effort, "SECONDS", 0.0)
     body = sc.Torus(1.0, 0.5)
     fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, (0, 0, 1)), length=3.0, n_rays=64)
     u = cr.near_field(fan, [(0.0, 0.0, z) for z in (0.5, 1.5, 3.0)], wavenumber=30.0, boundary=boundary)

@@ -19,7 +19,7 @@ import numpy as np
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import SurfaceError
 from creeping.field.boundary import Boundary
-from creeping.field.equation.tiles import POINTS, SIDE, VARYING, Tiles, tiles_for, tiles_of
+from creeping.field.equation.tiles import CUT, POINTS, SIDE, VARYING, WIDE, WIDE_CUT, Tiles, tiles_for, tiles_of
 from creeping.geometry.covering import patches_of
 from creeping.geometry.memo import memo
 from creeping.geometry.parts import inside, is_faceted, why_no_rays
@@ -33,8 +33,12 @@ MOST_SQUARES = 20_000
 """Triangles up to which squares are thought of: more are small."""
 
 
-def body_tiles(body: Any, wavenumber: float, boundary: Boundary, *, finest: bool = False) -> Tiles:
+def body_tiles(
+    body: Any, wavenumber: float, boundary: Boundary, *, finest: bool = False, coarse: bool = False
+) -> Tiles:
     """Tiles of a body for a wavenumber, 1/L, and a boundary; of facets the ``finest``, which go with other bodies'.
+
+    ``coarse`` ones have half the nodes or fewer, for fields within a per cent or so of the largest amplitude.
 
     Raises
     ------
@@ -42,19 +46,20 @@ def body_tiles(body: Any, wavenumber: float, boundary: Boundary, *, finest: bool
         If neither squares nor triangles of its own are the body, or one of several bodies reaches into another.
     """
     if is_faceted(body):
-        return facet_tiles(body, wavenumber, boundary, finest=finest)
+        return facet_tiles(body, wavenumber, boundary, finest=finest, coarse=coarse)
     if why_no_rays(body):
-        return _joined(body, [body_tiles(part, wavenumber, boundary, finest=True) for part in body.parts])
+        made = [body_tiles(part, wavenumber, boundary, finest=True, coarse=coarse) for part in body.parts]
+        return _joined(body, made)
     facets = memo(body, "own triangles", lambda: own_triangles(body)) if is_piecewise(body) else None
     if facets is not None and facets.flat:
-        return facet_tiles(facets, wavenumber, boundary, finest=finest)
+        return facet_tiles(facets, wavenumber, boundary, finest=finest, coarse=coarse)
     try:
-        return tiles_of(patches_of(body), wavenumber, boundary)
+        return tiles_of(patches_of(body), wavenumber, boundary, coarse=coarse)
     except SurfaceError:
         # of more pieces than squares cover
         if facets is None:
             raise
-        return replace(facet_tiles(facets, wavenumber, boundary, finest=finest), alone=True)
+        return replace(facet_tiles(facets, wavenumber, boundary, finest=finest, coarse=coarse), alone=True)
 
 
 def _joined(body: Any, made: list[Tiles]) -> Tiles:
@@ -66,7 +71,7 @@ def _joined(body: Any, made: list[Tiles]) -> Tiles:
         edges.append(np.where(known, tiles.edges + count, tiles.edges))
         count += tiles.edges[:, 0].max(initial=-1.0) + 1
     off, alone = max(tiles.off for tiles in made), any(tiles.alone for tiles in made)
-    whole = replace(Tiles.of(np.concatenate(shapes), POINTS, np.concatenate(edges)), off=off, alone=alone)
+    whole = replace(Tiles.of(np.concatenate(shapes), made[0].p, np.concatenate(edges)), off=off, alone=alone)
     _checked_apart(body, whole.points, np.repeat(np.arange(len(made)), [len(tiles.points) for tiles in made]))
     return whole
 
@@ -103,6 +108,8 @@ class Rule(NamedTuple):
     poorer : float
         What a node of it is worth on a body with edges: fields there err by 0.8 and 0.3 % of the largest with
         triangles of one and two nodes, by 0.25, 0.06 and 0.01 % with squares.
+    cut : float
+        Width of the tile next to an edge, over that of the one it is cut from.
     """
 
     squares: bool
@@ -110,12 +117,15 @@ class Rule(NamedTuple):
     side: float
     lacks: tuple[float, float]
     poorer: float
+    cut: float = CUT
 
 
 FINEST = Rule(True, POINTS, SIDE, (0.0, 0.0), 1.0)
 """Of bodies for which nodes cost nothing, and beside bodies of other kinds."""
 
 
+WIDER = 1.5
+"""Sides of coarse tiles over those of others."""
 RULES = (
     Rule(False, 1, 0.15, (0.06, 0.015), 3.0),
     Rule(False, 2, 0.38, (0.01, 0.0022), 2.0),
@@ -123,6 +133,8 @@ RULES = (
     Rule(True, 3, 0.55, (0.01, 0.004), 1.0),
     FINEST,
 )
+COARSE = Rule(True, POINTS - 1, WIDE, (0.0, 0.0), 1.0, WIDE_CUT)
+COARSE_RULES = (*(rule._replace(side=WIDER * rule.side) for rule in RULES[:-1]), COARSE)
 
 
 class Faceted(Protocol):
@@ -144,12 +156,16 @@ class Faceted(Protocol):
         ...
 
 
-def facet_tiles(body: Faceted, wavenumber: float, boundary: Boundary, *, finest: bool = False) -> Tiles:
+def facet_tiles(
+    body: Faceted, wavenumber: float, boundary: Boundary, *, finest: bool = False, coarse: bool = False
+) -> Tiles:
     """Tiles of a body on its facets for a wavenumber, 1/L, and a boundary: of the rule with the fewest nodes."""
     wavelength = (VARYING if boundary.varies else 1.0) * 2 * np.pi / wavenumber
-    rule = FINEST if finest else _chosen(body, wavelength)
+    rules = COARSE_RULES if coarse else RULES
+    rule = rules[-1] if finest else _chosen(body, wavelength, rules)
     if rule.squares:
-        made = tiles_for(_patches(body), 2 * np.pi / wavelength, side=rule.side, p=rule.p, lacks=rule.lacks)
+        k = 2 * np.pi / wavelength
+        made = tiles_for(_patches(body), k, side=rule.side, p=rule.p, cut=rule.cut, lacks=rule.lacks)
     else:
         mesh = halved(body.vertices, body.triangles, rule.side * wavelength)
         shapes, edges = _triangles(mesh.vertices, mesh.triangles)
@@ -162,20 +178,20 @@ def _patches(body: Faceted) -> Patches:
     return memo(body, "facet patches", lambda: facet_patches(body))
 
 
-def _chosen(body: Faceted, wavelength: float) -> Rule:
-    """The rule that takes the fewest nodes, each as much as it is worth."""
+def _chosen(body: Faceted, wavelength: float, rules: tuple[Rule, ...]) -> Rule:
+    """The rule of some that takes the fewest nodes, each as much as it is worth."""
     corners = body.vertices[body.triangles]
     _, number = sides_of(body.triangles)
     edged = bool(np.any(turns_of(body.vertices, body.triangles, number)[0] > SHARP))
     patches = _patches(body) if len(corners) < MOST_SQUARES else None
     nodes: dict[Rule, float] = {}
-    for rule in RULES:
+    for rule in rules:
         if not rule.squares:
             nodes[rule] = rule.p**2 * _halves(corners, rule.side * wavelength)
         elif patches is not None:
             nodes[rule] = rule.p**2 * _parts_of(patches, rule.side * wavelength)
-    if nodes.get(FINEST, np.inf) < CHEAP:
-        return FINEST
+    if nodes.get(rules[-1], np.inf) < CHEAP:
+        return rules[-1]
     return min(nodes, key=lambda rule: nodes[rule] * (rule.poorer if edged else 1.0))
 
 

@@ -28,15 +28,15 @@ TOGETHER = 2e8
 DENSE = 8e9
 """Bytes of a matrix, and of its transpose, that are kept at most."""
 
-TOLERANCE, STEPS = 3e-5, 80
-"""What is left of the equation, as a share of its right side, and steps at most."""
+TOLERANCE, COARSE_TOLERANCE, STEPS = 3e-5, 1e-3, 80
+"""What is left of the equation, as a share of its right side, from a start that errs as well, and steps at most."""
 
 ROWS = 4096
 """Rows of the sparse matrix that are made at a time."""
 
 
 class Columns(NamedTuple):
-    """Solutions at the nodes and what is left of the equation there (n, c, m), as a share of the right side (m,).
+    """Solutions and what is left of the equation, (n, m) or at the nodes (n, c, m), as a share of the right side (m,).
 
     c is 1, or 2 of a conductor. ``steps`` are those of GMRES.
     """
@@ -53,38 +53,59 @@ def is_dense(nodes: int, boundary: Boundary) -> bool:
 
 
 def solved_columns(
-    matrix: Matrix, right: ComplexArray, under: ComplexArray, tell: Callable[[str], None] = lambda words: None
+    matrix: Matrix,
+    right: ComplexArray,
+    under: ComplexArray,
+    tell: Callable[[str], None] = lambda words: None,
+    *,
+    start: ComplexArray | None = None,
+    steps: int = STEPS,
 ) -> Columns:
     """Solve for right sides at the nodes (n, ...), and at the points beneath them (s, ...): of a conductor (n, 2, ...).
 
-    ``tell`` hears of each part of them that is begun.
+    ``tell`` hears of each part of them that is begun. ``start`` (n, m) is the share of the right sides at the nodes,
+    m of them or m times some, that the currents are about; these have COARSE_TOLERANCE and no more than ``steps``.
     """
     nodes, c = len(matrix.root), matrix.columns
     right = right.reshape(nodes, c, -1).astype(complex)
+    first_guess, tolerance = None, TOLERANCE
+    if start is not None:
+        share = np.repeat(start, right.shape[2] // start.shape[1], axis=1)[:, None]
+        first_guess, tolerance = (right * share * matrix.root[:, None, None]).reshape(nodes * c, -1), COARSE_TOLERANCE
     right[matrix.at] -= 1j * under.reshape(len(matrix.at), *right.shape[1:])
     right = (right * matrix.root[:, None, None]).reshape(nodes * c, -1)
     product = matrix.product if is_dense(nodes, matrix.boundary) else SplitProduct(matrix)
     n, columns = right.shape
-    many = max(1, min(columns, int(TOGETHER / (16 * n * (STEPS + 1)))))
-    values, change, left = np.empty_like(right), np.empty_like(right), np.empty(columns)
-    steps = 0
+    many = max(1, min(columns, int(TOGETHER / (16 * n * (steps + 1)))))
+    values, change, left = np.zeros_like(right), np.empty_like(right), np.empty(columns)
+    taken = 0
     for first in range(0, columns, many):
         if first:
             tell(f"right side {first} of {columns}")
         at = slice(first, first + many)
-        values[:, at], left[at], taken = block_gmres(product, right[:, at], TOLERANCE, STEPS)
-        change[:, at] = right[:, at] - product(values[:, at])
-        steps = max(steps, taken)
+        rest = right[:, at]
+        if first_guess is not None:
+            values[:, at] = first_guess[:, at]
+            rest = rest - product(values[:, at])
+        size = np.linalg.norm(right[:, at], axis=0)
+        found = block_gmres(product, rest, tolerance, steps, size=size)
+        values[:, at] += found.values
+        change[:, at], left[at], taken = found.change, found.left, max(taken, found.steps)
     # fields at points make rows of their own
     matrix.__dict__.pop("whole", None)
     back = matrix.root[:, None, None]
-    return Columns(values.reshape(nodes, c, -1) / back, change.reshape(nodes, c, -1) / back, left, steps)
+    return Columns(values.reshape(nodes, c, -1) / back, change.reshape(nodes, c, -1) / back, left, taken)
 
 
 def block_gmres(
-    product: Callable[[ComplexArray], ComplexArray], right: ComplexArray, tolerance: float, steps: int
-) -> tuple[ComplexArray, FloatArray, int]:
-    """Solutions x (n, m) of A x = right (n, m), what is left of each as a share of its right side (m,), and steps.
+    product: Callable[[ComplexArray], ComplexArray],
+    right: ComplexArray,
+    tolerance: float,
+    steps: int,
+    *,
+    size: FloatArray | None = None,
+) -> Columns:
+    """Solutions x (n, m) of A x = right (n, m), right - A x, and that as a share of the right sides' size (m,).
 
     Parameters
     ----------
@@ -95,21 +116,24 @@ def block_gmres(
         What may be left.
     steps : int
         At most.
+    size : (m,)
+        What shares are of, if not the norm of the right sides.
 
     Examples
     --------
     >>> A = np.array([[2.0, 1.0], [0.0, 1.0]])
-    >>> x, left, steps = block_gmres(lambda v: A @ v, np.eye(2, dtype=complex), 1e-10, 5)
-    >>> bool(np.allclose(A @ x, np.eye(2))), steps
+    >>> found = block_gmres(lambda v: A @ v, np.eye(2, dtype=complex), 1e-10, 5)
+    >>> bool(np.allclose(A @ found.values, np.eye(2))), found.steps
     (True, 2)
     """
     n, m = right.shape
-    size = np.linalg.norm(right, axis=0)
-    scale = np.where(size > 0, size, 1.0)
+    norm = np.linalg.norm(right, axis=0)
+    whole = norm if size is None else size
+    scale = np.where(whole > 0, whole, 1.0)
     basis = np.empty((steps + 1, n, m), dtype=complex)
-    basis[0] = right / scale
+    basis[0] = right / np.where(norm > 0, norm, 1.0)
     H = np.zeros((m, steps + 1, steps), dtype=complex)
-    used, left, y = 0, np.ones(m), np.zeros((m, steps), dtype=complex)
+    used, left, y = 0, norm / scale, np.zeros((m, steps), dtype=complex)
     for step in range(steps):
         new = product(basis[step])
         # twice, for the sake of rounding
@@ -122,7 +146,7 @@ def block_gmres(
         basis[step + 1] = new / np.where(length > 0, length, 1.0)
         used = step + 1
         first = np.zeros((m, used + 1), dtype=complex)
-        first[:, 0] = size
+        first[:, 0] = norm
         # each right side ends where it would by itself
         for one in np.flatnonzero(left > tolerance):
             h = H[one, : used + 1, :used]
@@ -131,7 +155,8 @@ def block_gmres(
             left[one] = np.linalg.norm(h @ found - first[one]) / scale[one]
         if np.all(left <= tolerance):
             break
-    return np.einsum("snm,ms->nm", basis[:used], y[:, :used]), left, used
+    change = right - np.einsum("snm,mst,mt->nm", basis[: used + 1], H[:, : used + 1, :used], y[:, :used], optimize=True)
+    return Columns(np.einsum("snm,ms->nm", basis[:used], y[:, :used]), change, left, used)
 
 
 class SplitProduct:
@@ -144,13 +169,13 @@ class SplitProduct:
         low, high = nodes.points.min(axis=0), nodes.points.max(axis=0)
         plain = matrix.soft or matrix.boundary.kind == "hard"
         load = CURL if matrix.vector else ONE_LAYER if plain else TWO_LAYERS
-        kernel = best_split(lambda a: SmoothKernel(k, high - low, a), x, nodes.points, load, np.inf)
-        if kernel is None:
+        best = best_split(lambda a: SmoothKernel(k, high - low, a), x, nodes.points, load, np.inf)
+        if best is None:
             raise InvalidInputError(
                 f"sums over {len(nodes.points)} nodes take more memory than there is; lower the wavenumber or set "
                 "CREEPING_MEMORY"
             )
-        self._sums = SplitSums(kernel, x, n, nodes.points, nodes.normals, matrix.root**2 / (4 * np.pi))
+        self._sums = SplitSums(best.kernel, x, n, nodes.points, nodes.normals, matrix.root**2 / (4 * np.pi))
         self._own = _correction(matrix, nodes, matrix.root, "double")
         self._under = _correction(matrix, inner, matrix.root[matrix.at], "slope" if matrix.soft else "double")
 

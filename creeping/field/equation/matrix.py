@@ -51,11 +51,9 @@ DEPTH, SHALLOWER, LEAST = np.pi / 2, 0.6, 0.15
 """Depth of the second surface over 1/k, the factor by which it is less where the body is thin, and least share."""
 CLEAR = 0.7
 """Least distance of its points from all nodes, over the depth."""
-PAIRS = 4096
-"""Pairs of a place and a tile near to it that are made tangent at once."""
 TANGENT = 2
 """Nodes more along a side of a curved tile than it has, at which J is made tangent to the body."""
-EACH, VECTOR = 2.5e-9, 4.0
+EACH, VECTOR = 7.3e-9, 2.0
 """Seconds of a pair, and what a pair of a conductor takes of that."""
 BLOCK = 512
 """Rows that are made at a time of what is not kept."""
@@ -360,32 +358,19 @@ class Matrix:
         found = finer.rows(places.points, near, self.k, 2, places.own)
         normals = finer.normals.reshape(tiles.count, -1, 3)
         q = np.stack([self.nodes.a, self.nodes.b], axis=1).reshape(tiles.count, -1, 2, 3)
-        tile, out = np.repeat(np.arange(tiles.count), np.diff(starts)), []
-        for first in range(0, len(targets), PAIRS):
-            at = slice(first, first + PAIRS)
-            out.append(self._tangent(found[at], places.part(targets[at]), normals[tile[at]], q[tile[at]]))
-        return np.concatenate(out) if out else np.empty((0, 2, tiles.p**2, 2), dtype=complex)
+        tile, of = np.repeat(np.arange(tiles.count), np.diff(starts)), places.part(targets)
+        if tiles.planar:
+            return _across(found, of, q[tile])
+        from creeping.field.kernels.tile_rows import tangent_rows
 
-    def _tangent(self, found: ComplexArray, of: Places, n: FloatArray, q: FloatArray) -> ComplexArray:
-        """Entries (m, 2, p p, 2) of integrals (m, 3, f), normals n (m, f, 3) at the finer nodes, and a and b at nodes.
+        out = np.empty((len(targets), 2, tiles.p**2, 2), dtype=complex)
+        given = found, tile, of.normals, of.a, of.b, np.ascontiguousarray(normals), self._at_finer, q
 
-        With J_f = sum_j l_j(y_f) [q_j - n_f (n_f.q_j)] they are those of q_j less those of its part along n_f.
-        """
-        if self.tiles.planar:
-            return _across(found, of, q)
-        m, finer = len(found), self._at_finer.shape[0]
-        # few large products: many small ones wait for each other where a machine is busy
-        coarse = (found.reshape(-1, finer) @ self._at_finer).reshape(m, 3, -1)
-        lean, across = np.einsum("pc,pcf->pf", of.normals, found), np.einsum("px,pfx->pf", of.normals, n)
-        leaning = np.einsum("pc,pcj->pj", of.normals, coarse)[:, :, None]
-        through, out = np.einsum("px,pjcx->pjc", of.normals, q), []
-        for p in (of.a, of.b):
-            rest = np.einsum("pc,pcf->pf", p, found) * across - lean * np.einsum("px,pfx->pf", p, n)
-            along = (rest[:, None] * np.swapaxes(n, 1, 2)).reshape(-1, finer) @ self._at_finer
-            whole = np.einsum("pc,pcj->pj", p, coarse)[:, :, None] * through
-            whole -= np.einsum("px,pjcx->pjc", p, q) * leaning
-            out.append(whole - np.einsum("pxj,pjcx->pjc", along.reshape(m, 3, -1), q))
-        return np.stack(out, axis=1)
+        def work(part: slice) -> None:
+            tangent_rows(*given, part.start, part.stop, out)
+
+        in_threads(work, len(targets), least=64, multiple=1, seconds=1e-5)
+        return out
 
     @cached_property
     def _finer(self) -> Tiles:

@@ -23,10 +23,12 @@ from creeping.field.currents.far_sum import far_by_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation.columns import solved_columns
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents, charges, twice_incident
+from creeping.field.equation.effort import FULL, Effort
 from creeping.field.equation.matrix import Matrix
 from creeping.field.equation.tiles import Tiles
 from creeping.field.far_result import FarField, incident_mix, spherical_frame
 from creeping.field.point_result import FieldStatus, NearField, SurfaceField, judged
+from creeping.field.reflected import plane_reflection
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.checks import unit_of
 from creeping.geometry.parts import inside as inside_of
@@ -50,6 +52,8 @@ class Solution:
     nodes : int
     steps : int
         Of GMRES.
+    effort : Effort
+        Whether its tiles are coarse, and the steps of GMRES at most.
     left : (m,) or (m, 2)
         What is left of the equation, as a share of its right side.
 
@@ -72,16 +76,18 @@ class Solution:
         kind: Boundary,
         tiles: Tiles,
         tell: Callable[[str], None],
+        effort: Effort = FULL,
     ) -> None:
         self.body, self.directions, self.wavenumber, self.boundary = body, directions, wavenumber, boundary
         self._kind, self._matrix = kind, Matrix(tiles, wavenumber, kind)
-        self.nodes = len(tiles.points)
+        self.nodes, self.effort = len(tiles.points), effort
         matrix = self._matrix
         magnetic = np.swapaxes(np.cross(directions[:, None], spherical_frame(directions)), 1, 2)
         right, under = (
             twice_incident(kind, places, directions, wavenumber, magnetic) for places in (matrix.nodes, matrix.inner)
         )
-        found = solved_columns(matrix, right, under, tell)
+        start = self._optics() if effort.coarse else None
+        found = solved_columns(matrix, right, under, tell, start=start, steps=effort.steps)
         self.steps, self.left = found.steps, found.left
         both = np.stack([found.values, found.change])
         if matrix.vector:
@@ -93,6 +99,16 @@ class Solution:
             both = both[:, :, 0]
         self._values: ComplexArray = both[0]
         self._change: ComplexArray = both[1]
+
+    def _optics(self) -> ComplexArray:
+        """Currents of physical optics, as shares of twice the incident wave: (n, m)."""
+        x, n = self._matrix.nodes[:2]
+        shares = []
+        for d in self.directions:
+            lit = is_lit(self.body, x, n, d)
+            reflected = plane_reflection(np.abs(n @ d), self._kind.at(x))
+            shares.append(lit if self._kind.kind in ("soft", "conductor") else lit * 0.5 * (1 + reflected))
+        return np.asarray(np.stack(shares, axis=1), dtype=complex)
 
     def __repr__(self) -> str:
         worst = max(float(self.currents(number).extinction) for number in range(min(len(self.directions), 8)))

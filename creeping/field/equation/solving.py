@@ -23,36 +23,19 @@ import numpy as np
 from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import checked, checked_plain
-from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, scalar_boundaries
+from creeping.field.boundary import BoundaryLike
 from creeping.field.equation.body_tiles import body_tiles
-from creeping.field.equation.columns import TOGETHER, is_dense
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
-from creeping.field.equation.matrix import EACH, VECTOR
+from creeping.field.equation.effort import ASKED, SECONDS, Effort, equation_boundary, plan_of
 from creeping.field.equation.solution import Solution
 from creeping.geodesics.equations import points_of_charts
 from creeping.geometry.directions import unit_directions
 from creeping.geometry.memo import memo
 from creeping.geometry.piecewise import is_piecewise
-from creeping.geometry.quadrature import node_count
 from creeping.geometry.surface import Surface
-from creeping.kernels.threads import thread_count
-from creeping.storage.memory import budget, within_budget
-
-PRODUCTS = 25
-"""Products with the matrix, about, that an incidence takes."""
-PER_NODE, NEAR_VECTOR = 5e-4, 2.0
-"""Seconds of a core that integrals over tiles near to a node take, and what those of a conductor take of that."""
-PER_ENTRY = 4e-10
-"""Seconds of an entry of the matrix in a product with one of several columns."""
-SUM, SUM_VECTOR = 1e-5, 4e-5
-"""Seconds of a node in a split sum for one column."""
-SECONDS = 30.0
-"""What the equation may take, unless the caller says."""
 
 KEPT = 6
 """Solutions kept with a body."""
-ASKED = 300.0
-"""Seconds that the equation may take if it is asked for."""
 POOR = 0.05
 """What currents may leave of the incident wave inside: those that leave more have not been resolved."""
 SAME = 1e-14
@@ -79,7 +62,8 @@ def solve(
     wavenumber : float, 1/L
     boundary : "soft", "hard", "pec" or ImpedanceBoundary
     seconds : float
-        What it may take, about, with all cores; more is refused before it starts.
+        What it may take, about, with all cores. Where fine tiles take more, coarse ones serve and as many steps of
+        GMRES as there is time for, with a larger error; what takes more still is refused before it starts.
     progress : callable, optional
         Is told in words what is done, with the number of nodes, the time and the memory that it takes.
 
@@ -104,40 +88,34 @@ def solve(
     (['equation', 'equation'], True)
     """
     checked_plain(body)
-    kinds = scalar_boundaries(boundary)
     k = checked(wavenumber, 2, body)
     d = unit_directions(directions, "directions of incidence").reshape(-1, 3)
-    tell = progress or (lambda words: None)
-    kind = CONDUCTOR if len(kinds) == 2 else kinds[0]
-    tiles = body_tiles(body, k, kind)
-    takes, memory = cost(len(tiles.points), kind, len(d))
-    told = f"{len(tiles.points)} nodes, about {takes:.2g} s and {memory / 1e9:.2g} GB"
-    if takes > seconds:
+    plan = plan_of(body, k, boundary, seconds, incidences=len(d), together=True)
+    told = f"{plan.nodes} nodes, about {plan.seconds:.2g} s and {plan.memory / 1e9:.2g} GB"
+    if not plan.nodes:
+        raise SurfaceError(plan.refused)
+    if plan.refused:
         raise InvalidInputError(
-            f"the integral equation at wavenumber {k:g} has {told}, more than the {seconds:g} s that it may take; "
-            "give seconds=, or a lower wavenumber, or let rays serve (creeping.far_field)"
+            f"the integral equation at wavenumber {k:g} for {len(d)} incidences is not solved: {plan.refused}; "
+            "give seconds=, fewer incidences, a lower wavenumber, more memory (CREEPING_MEMORY), or let rays serve "
+            "(creeping.far_field)"
         )
-    what = f"the integral equation between {len(tiles.points)} nodes for {len(d)} incidences"
-    within_budget(memory, what, "lower the wavenumber or give fewer")
+    tell = progress or (lambda words: None)
     tell(f"{told}: integrals between the nodes")
-    return Solution(body, d, k, boundary, kind, tiles, tell)
+    return _solved(body, d, k, boundary, plan.effort, tell)
 
 
-def cost(nodes: int, boundary: Boundary, incidences: int) -> tuple[float, float]:
-    """Seconds and bytes, about, that the equation between nodes takes, of one incidence or of several."""
-    vector = boundary.kind == "conductor"
-    columns = incidences * (2 if vector else 1)
-    # of incidences their values and changes, and what GMRES keeps
-    kept = 64.0 * nodes * incidences * (6 if vector else 1) + TOGETHER
-    near = 2 * nodes * PER_NODE * (NEAR_VECTOR if vector else 1.0)
-    if is_dense(nodes, boundary):
-        entries = float(nodes) ** 2 * (4 if vector else 1)
-        pairs = 2 * float(nodes) ** 2 * EACH * (VECTOR if vector else 1.0)
-        products = PRODUCTS * entries * PER_ENTRY * columns
-        # the matrix and its transpose
-        return (pairs + near + products) / thread_count(), 16 * entries + kept
-    each, memory = (SUM_VECTOR, 2e4 * 4) if vector else (SUM, 2e4)
-    return near / thread_count() + PRODUCTS * columns * each * nodes, memory * nodes + kept
+def _solved(
+    body: Surface,
+    directions: FloatArray,
+    wavenumber: float,
+    boundary: BoundaryLike,
+    effort: Effort,
+    tell: Callable[[str], None] = lambda words: None,
+) -> Solution:
+    kind = equation_boundary(boundary)
+    tiles = body_tiles(body, wavenumber, kind, coarse=effort.coarse)
+    return Solution(body, directions, wavenumber, boundary, kind, tiles, tell, effort)
 
 
 class Solved(NamedTuple):
@@ -157,7 +135,7 @@ def solution_for(body: Surface, direction: FloatArray, wavenumber: float, bounda
     if _is_rough(body):
         return None
     found = _found(body, direction, wavenumber, boundary)
-    if found is None and not too_much(body, wavenumber, boundary, SECONDS):
+    if found is None:
         solve_together(body, direction[None], wavenumber, boundary)
         found = _found(body, direction, wavenumber, boundary)
     if found is None or not found.currents.extinction <= POOR:
@@ -174,76 +152,59 @@ def asked_solution(body: Surface, direction: FloatArray, wavenumber: float, boun
         If it costs more, or the body has no mesh.
     """
     found = _found(body, direction, wavenumber, boundary)
-    if found is None:
-        why = too_much(body, wavenumber, boundary, ASKED)
-        if why:
+    if found is None or found.solution.effort.coarse:
+        plan = plan_of(body, wavenumber, boundary, ASKED)
+        if found and found.solution.effort == plan.effort:
+            return found
+        if plan.refused:
             raise InvalidInputError(
-                f"the integral equation is not solved at wavenumber {wavenumber:g}: {why}; rays and optics serve "
-                "without method='equation'"
+                f"the integral equation is not solved at wavenumber {wavenumber:g}: {plan.refused}; rays and optics "
+                "serve without method='equation'"
             )
-        found = Solved(solve(body, direction, wavenumber=wavenumber, boundary=boundary, seconds=np.inf), 0)
+        found = Solved(_solved(body, direction[None], wavenumber, boundary, plan.effort), 0)
         _keep(body, found.solution)
     return found
 
 
 def solve_together(body: Surface, directions: FloatArray, wavenumber: float, boundary: BoundaryLike) -> None:
     """Solve the equation for unit directions (m, 3) at once and keep it, if it costs less than SECONDS for one."""
-    if not too_much(body, wavenumber, boundary, SECONDS):
+    plan = plan_of(body, wavenumber, boundary, incidences=len(directions))
+    if not plan.refused:
         try:
-            _keep(body, solve(body, directions, wavenumber=wavenumber, boundary=boundary, seconds=np.inf))
+            _keep(body, _solved(body, directions, wavenumber, boundary, plan.effort))
         except (InvalidInputError, SurfaceError):
             return
 
 
-class Plan(NamedTuple):
-    """Nodes, seconds and bytes that the equation takes, about; why it is not solved, or nothing."""
+def solved_alone(
+    body: Surface,
+    directions: FloatArray,
+    wavenumber: float,
+    boundary: BoundaryLike,
+    *,
+    fine: bool = False,
+    tell: Callable[[str], None] = lambda words: None,
+) -> Solution:
+    """The solution for unit directions (m, 3) of a body that nothing else serves, within ASKED for one of them.
 
-    nodes: int
-    seconds: float
-    memory: float
-    refused: str
+    As it is within SECONDS where it can be, unless fine tiles are asked for.
 
-
-def plan_of(
-    body: Surface, wavenumber: float, boundary: BoundaryLike, seconds: float = SECONDS, *, incidences: int = 1
-) -> Plan:
-    """What the equation takes, and whether that of one incidence is too much time or memory, or cannot be."""
-    kind = _kind(boundary)
-    try:
-        nodes = _nodes(body, wavenumber, kind)
-    except SurfaceError as error:
-        return Plan(0, np.inf, np.inf, str(error))
-    takes, memory = cost(nodes, kind, 1)
-    refused = f"{nodes} nodes take {memory / 1e9:.2g} GB" if memory > budget() else ""
-    if takes > seconds:
-        refused = f"{nodes} nodes take about {takes:.2g} s, more than {seconds:g}"
-    if incidences > 1:
-        takes, memory = cost(nodes, kind, incidences)
-    return Plan(nodes, takes, memory, refused)
-
-
-def too_much(body: Surface, wavenumber: float, boundary: BoundaryLike, seconds: float) -> str:
-    """Why the equation of one incidence takes too much time or memory, or cannot be; nothing if it does not."""
-    return plan_of(body, wavenumber, boundary, seconds).refused
-
-
-def is_large(body: Surface, wavenumber: float, boundary: BoundaryLike) -> bool:
-    """Whether the equation of one incidence costs more than SECONDS; of large bodies told without making tiles."""
-    # quadrature of the currents has no more than twice the nodes
-    least = node_count(body, wavenumber) // 2
-    return cost(least, _kind(boundary), 1)[0] > SECONDS or bool(too_much(body, wavenumber, boundary, SECONDS))
-
-
-def expected_seconds_of(body: Surface, wavenumber: float, boundary: BoundaryLike) -> float:
-    """About what the equation of one incidence costs, 0 where it is not solved by itself."""
-    plan = plan_of(body, wavenumber, boundary)
-    return 0.0 if plan.refused else plan.seconds
-
-
-def _kind(boundary: BoundaryLike) -> Boundary:
-    """The boundary of the equation: of a conductor one, not two scalar ones."""
-    kinds = scalar_boundaries(boundary)
-    return CONDUCTOR if len(kinds) == 2 else kinds[0]
+    Raises
+    ------
+    InvalidInputError, SurfaceError
+        If it takes more time or memory, or the body has no tiles.
+    """
+    count = len(directions)
+    plan = plan_of(body, wavenumber, boundary, incidences=count)
+    if plan.refused or (fine and plan.effort.coarse):
+        plan = plan_of(body, wavenumber, boundary, ASKED, incidences=count)
+    if plan.refused:
+        raise (InvalidInputError if plan.nodes else SurfaceError)(
+            f"the integral equation is not solved at wavenumber {wavenumber:g}: {plan.refused}; give a lower "
+            "frequency, or a coarser mesh"
+        )
+    tell(f"{plan.nodes} nodes, about {plan.seconds:.2g} s and {plan.memory / 1e9:.2g} GB: integrals between the nodes")
+    return _solved(body, directions, wavenumber, boundary, plan.effort, tell)
 
 
 def _is_rough(body: Surface) -> bool:
@@ -254,17 +215,9 @@ def _is_rough(body: Surface) -> bool:
     return memo(body, "rough somewhere", lambda: bool(np.any(rough(points_of_charts(body)))))
 
 
-def _nodes(body: Surface, wavenumber: float, kind: Boundary) -> int:
-    known: dict[tuple[float, bool, bool], int] = memo(body, "nodes of tiles", dict)
-    key = wavenumber, kind.varies, kind.kind == "conductor"
-    if key not in known:
-        known[key] = len(body_tiles(body, wavenumber, kind).points)
-    return known[key]
-
-
 def _found(body: Surface, direction: FloatArray, wavenumber: float, boundary: BoundaryLike) -> Solved | None:
     known: list[Solution] = memo(body, "solutions", list)
-    for solution in known:
+    for solution in reversed(known):
         if solution.wavenumber == wavenumber and solution.boundary == boundary:
             same = np.flatnonzero(np.max(np.abs(solution.directions - direction), axis=1) < SAME)
             if len(same):

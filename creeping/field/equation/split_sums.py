@@ -155,6 +155,14 @@ def _composite(least: float) -> int:
         n += 1
 
 
+class Split(NamedTuple):
+    """A kernel that splits sums, and the seconds and bytes that a sum takes, about."""
+
+    kernel: SmoothKernel
+    seconds: float
+    memory: float
+
+
 class Load(NamedTuple):
     """What a sum takes: transforms, seconds of a near pair, in it and to be made, and bytes of a wave and of a pair."""
 
@@ -365,8 +373,8 @@ def best_split(
     nodes: FloatArray,
     load: Load,
     seconds: float,
-) -> SmoothKernel | None:
-    """The kernel that splits sums over nodes (n, 3) at points (m, 3) best, or None where all pairs are done sooner.
+) -> Split | None:
+    """What splits sums over nodes (n, 3) at points (m, 3) best, or None where all pairs are done sooner.
 
     Parameters
     ----------
@@ -397,5 +405,5 @@ def best_split(
         each = load.transforms * places + load.per_pair * pairs
         whole = USES * each + load.for_pair * pairs + 4 * PER_MODE * modes
         if whole < least:
-            best, least = kernel, whole
+            best, least = Split(kernel, each, load.mode_bytes * modes + load.pair_bytes * pairs), whole
     return best

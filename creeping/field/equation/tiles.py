@@ -35,10 +35,14 @@ FINE = 12
 """Nodes along a side of a tile by which fields off it are summed."""
 CUT = 0.1
 """Width of the tile next to an edge or tip, over that of the one it is cut from."""
-NEAR = 1.7
-"""Distance of points from the middle of a tile, over its size, from which its nodes serve alone."""
+WIDE, WIDE_CUT = 1.0, 0.5
+"""Side and cut of coarse tiles: far fields of cylinders err by 0.005 to 0.03 % of the largest amplitude."""
+NEAR, NEAR_FEW = 1.4, 1.7
+"""Distance of points from the middle of a tile, over its size, from which its nodes serve alone: of four nodes a side
+or more, and of fewer."""
 APART, RULE = 1.0, 5
-"""Distance of the middles of parts of a tile from a point, over their size, at least; and the points of their rule."""
+"""Distance of the middles of parts of a tile from a point, over their size, at least, and the points of their rule: of
+tiles of four nodes four."""
 BESIDE, STEPS = 12, 8
 """Nodes next to a point whose tiles may be its own, and Newton steps to its place there."""
 ASIDE = 1e-5
@@ -168,7 +172,7 @@ class Tiles:
         """Where the points (m, 3) near each tile stand (t + 1,), and their numbers (pairs,)."""
         from scipy.spatial import cKDTree
 
-        lists = cKDTree(points).query_ball_point(self.middles, NEAR * self.sizes)
+        lists = cKDTree(points).query_ball_point(self.middles, (NEAR if self.p >= RULE - 1 else NEAR_FEW) * self.sizes)
         counts = np.array([len(one) for one in lists], dtype=np.int64)
         targets = np.concatenate([np.sort(one) for one in lists]).astype(np.int64) if counts.any() else counts[:0]
         return np.concatenate([[0], np.cumsum(counts)]), targets
@@ -189,7 +193,7 @@ class Tiles:
 
         starts, targets = near
         grid, (at_u, at_v) = self._grid, self.places
-        rules = (*gauss(RULE), *gauss(ANGLES), *gauss(RADII))
+        rules = (*gauss(RULE - 1 if self.p == RULE - 1 else RULE), *gauss(ANGLES), *gauss(RADII))
         nowhere = np.zeros(len(points))
         places = own or (np.full(len(points), -1), nowhere, nowhere)
         out = np.empty((len(targets), 6, self.p**2))
@@ -345,12 +349,14 @@ class Tiles:
         return x, n / np.linalg.norm(n, axis=1, keepdims=True)
 
 
-def tiles_of(patches: Patches, wavenumber: float, boundary: Boundary) -> Tiles:
-    """Tiles of a body's squares for a wavenumber, 1/L, and a boundary.
+def tiles_of(patches: Patches, wavenumber: float, boundary: Boundary, *, coarse: bool = False) -> Tiles:
+    """Tiles of a body's squares for a wavenumber, 1/L, and a boundary; ``coarse`` ones have fewer nodes.
 
     An admittance that varies is known at nodes alone, so these are closer.
     """
     share = VARYING if boundary.varies else 1.0
+    if coarse:
+        return tiles_for(patches, wavenumber, side=share * WIDE, turn=share * TURN, p=POINTS - 1, cut=WIDE_CUT)
     return tiles_for(patches, wavenumber, side=share * SIDE, turn=share * TURN)
 
 
@@ -361,12 +367,15 @@ def tiles_for(
     side: float = SIDE,
     turn: float = TURN,
     p: int = POINTS,
+    cut: float = CUT,
     lacks: tuple[float, float] = (0.0, 0.0),
 ) -> Tiles:
     """Tiles of a body's squares for a wavenumber, 1/L, of sides and turns no longer than these."""
     steps = _parts(patches, side * 2 * np.pi / wavenumber, turn)
-    along = _edge_breaks(patches, steps)
-    boxes = [_boxes(patches, number, [lane[number] for lane in steps], along) for number in range(len(patches.off))]
+    along = _edge_breaks(patches, steps, cut)
+    boxes = [
+        _boxes(patches, number, [lane[number] for lane in steps], along, cut) for number in range(len(patches.off))
+    ]
     owner = np.repeat(np.arange(len(boxes)), [len(box) for box in boxes])
     every = np.concatenate([np.array(box) for box in boxes])
     low, high, edges = every[:, [0, 2]], every[:, [1, 3]], every[:, 4:]
@@ -403,7 +412,7 @@ def _parts(patches: Patches, longest: float, most: float) -> tuple[FloatArray, F
     return lanes[0], lanes[1]
 
 
-def _edge_breaks(patches: Patches, steps: tuple[FloatArray, FloatArray]) -> dict[int, FloatArray]:
+def _edge_breaks(patches: Patches, steps: tuple[FloatArray, FloatArray], cut: float) -> dict[int, FloatArray]:
     """Where tiles on both sides of each edge are parted along it, 0 to 1, and cut next to corners of either.
 
     Were they not the same on both sides, what one side lacks of the broken power of the distance would not be what the
@@ -431,13 +440,13 @@ def _edge_breaks(patches: Patches, steps: tuple[FloatArray, FloatArray]) -> dict
         for corner in corners.get(key, ()):
             place = int(np.argmin(np.abs(breaks - corner)))
             beside = [breaks[j] for j in (place - 1, place + 1) if 0 <= j < len(breaks)]
-            breaks = np.union1d(breaks, [corner + CUT * (one - corner) for one in beside])
+            breaks = np.union1d(breaks, [corner + cut * (one - corner) for one in beside])
         out[key] = breaks
     return out
 
 
 def _boxes(
-    patches: Patches, number: int, steps: list[FloatArray], along: dict[int, FloatArray]
+    patches: Patches, number: int, steps: list[FloatArray], along: dict[int, FloatArray], share: float
 ) -> list[tuple[float, ...]]:
     """Parts (u0, u1, v0, v1) of a square and their ``edges``: strips parted as the edges are, and what is left."""
     edges, t = patches.edges[number], lobatto(DEGREE)
@@ -454,7 +463,7 @@ def _boxes(
     for side in breaks:
         axis = 0 if side < 2 else 1
         meeting = [other for other in breaks if (other < 2) != (side < 2)]
-        cut = CUT / max(counts[axis], 2 if edges[2 * axis] and edges[2 * axis + 1] else 1)
+        cut = share / max(counts[axis], 2 if edges[2 * axis] and edges[2 * axis + 1] else 1)
         if meeting:
             its = breaks[meeting[0]]
             cut = float(its[1] if side % 2 == 0 else 1 - its[-2])
@@ -473,7 +482,7 @@ def _boxes(
             out.append((*across, one, two, *where) if side < 2 else (one, two, *across, *where))
     u = _between(a, b, counts[0])
     if patches.tips[number]:
-        u = np.union1d(u, u[1] * CUT ** np.arange(1.0, 3.0))
+        u = np.union1d(u, u[1] * share ** np.arange(1.0, 3.0))
     wide = steps[1].sum(axis=1)
     for u0, u1 in pairwise(u):
         inside = (t >= u0) & (t <= u1)

@@ -182,6 +182,8 @@ def scalar_pairs(x, n, f, y, sides, g, single, k, tilt, first, last, out):
     for dG/dn_x; ``single`` (2, nodes) is s, or has no column.
     """
     per, count, layer = k / (2 * math.pi), y.shape[1], single.shape[1] > 0
+    # real and imaginary parts side by side would keep the loop from vectors
+    room = np.empty((2, count))
     for i in range(first, last):
         x0, x1, x2 = x[0, i], x[1, i], x[2, i]
         n0, n1, n2 = n[0, i], n[1, i], n[2, i]
@@ -203,35 +205,45 @@ def scalar_pairs(x, n, f, y, sides, g, single, k, tilt, first, last, out):
                 real += single[0, j] * c - single[1, j] * s
                 imaginary += single[0, j] * s + single[1, j] * c
             scale = f[i] * g[j]
-            out[i, j, 0], out[i, j, 1] = scale * real, scale * imaginary
+            room[0, j], room[1, j] = scale * real, scale * imaginary
+        for j in range(count):
+            out[i, j, 0], out[i, j, 1] = room[0, j], room[1, j]
 
 
 @njit(**entry_options)
 def vector_pairs(x, n, a, b, f, y, c, e, g, k, first, last, out):
     """Fill rows first..last of out (m, 2, nodes, 2, 2): p = a, b (3, m) and q = c, e (3, nodes), and both parts."""
     per, count = k / (2 * math.pi), y.shape[1]
-    for i in range(first, last):
+    # few arrays, and no parts side by side: else the loop is not one of vectors
+    of, room = np.empty((10, count)), np.empty((8, count))
+    for row in range(3):
         for j in range(count):
-            d0, d1, d2 = x[0, i] - y[0, j], x[1, i] - y[1, j], x[2, i] - y[2, j]
+            of[row, j], of[3 + row, j], of[6 + row, j], of[9, j] = y[row, j], c[row, j], e[row, j], g[j]
+    for i in range(first, last):
+        x0, x1, x2, n0, n1, n2 = x[0, i], x[1, i], x[2, i], n[0, i], n[1, i], n[2, i]
+        a0, a1, a2, b0, b1, b2, share = a[0, i], a[1, i], a[2, i], b[0, i], b[1, i], b[2, i], f[i]
+        for j in range(count):
+            d0, d1, d2 = x0 - of[0, j], x1 - of[1, j], x2 - of[2, j]
             square = d0 * d0 + d1 * d1 + d2 * d2
             there = 1.0 if square > 0.0 else 0.0
             inverse = there / math.sqrt(square if square > 0.0 else 1.0)
             cosine, sine = cosine_sine(per * square * inverse)
-            scale = f[i] * g[j] * inverse * inverse
+            scale = share * of[9, j] * inverse * inverse
             real, imaginary = scale * (-cosine * inverse - k * sine), scale * (k * cosine - sine * inverse)
-            lean = n[0, i] * d0 + n[1, i] * d1 + n[2, i] * d2
-            ad, bd = a[0, i] * d0 + a[1, i] * d1 + a[2, i] * d2, b[0, i] * d0 + b[1, i] * d1 + b[2, i] * d2
-            nc = n[0, i] * c[0, j] + n[1, i] * c[1, j] + n[2, i] * c[2, j]
-            ne = n[0, i] * e[0, j] + n[1, i] * e[1, j] + n[2, i] * e[2, j]
-            ac = a[0, i] * c[0, j] + a[1, i] * c[1, j] + a[2, i] * c[2, j]
-            ae = a[0, i] * e[0, j] + a[1, i] * e[1, j] + a[2, i] * e[2, j]
-            bc = b[0, i] * c[0, j] + b[1, i] * c[1, j] + b[2, i] * c[2, j]
-            be = b[0, i] * e[0, j] + b[1, i] * e[1, j] + b[2, i] * e[2, j]
-            h0, h1, h2, h3 = ad * nc - ac * lean, ad * ne - ae * lean, bd * nc - bc * lean, bd * ne - be * lean
-            out[i, 0, j, 0, 0], out[i, 0, j, 0, 1] = real * h0, imaginary * h0
-            out[i, 0, j, 1, 0], out[i, 0, j, 1, 1] = real * h1, imaginary * h1
-            out[i, 1, j, 0, 0], out[i, 1, j, 0, 1] = real * h2, imaginary * h2
-            out[i, 1, j, 1, 0], out[i, 1, j, 1, 1] = real * h3, imaginary * h3
+            lean, ad, bd = n0 * d0 + n1 * d1 + n2 * d2, a0 * d0 + a1 * d1 + a2 * d2, b0 * d0 + b1 * d1 + b2 * d2
+            c0, c1, c2, e0, e1, e2 = of[3, j], of[4, j], of[5, j], of[6, j], of[7, j], of[8, j]
+            nc, ne = n0 * c0 + n1 * c1 + n2 * c2, n0 * e0 + n1 * e1 + n2 * e2
+            h0 = ad * nc - (a0 * c0 + a1 * c1 + a2 * c2) * lean
+            h1 = ad * ne - (a0 * e0 + a1 * e1 + a2 * e2) * lean
+            h2 = bd * nc - (b0 * c0 + b1 * c1 + b2 * c2) * lean
+            h3 = bd * ne - (b0 * e0 + b1 * e1 + b2 * e2) * lean
+            room[0, j], room[1, j], room[2, j], room[3, j] = real * h0, imaginary * h0, real * h1, imaginary * h1
+            room[4, j], room[5, j], room[6, j], room[7, j] = real * h2, imaginary * h2, real * h3, imaginary * h3
+        for row in range(2):
+            for j in range(count):
+                for column in range(2):
+                    at = 4 * row + 2 * column
+                    out[i, row, j, column, 0], out[i, row, j, column, 1] = room[at, j], room[at + 1, j]
 
 
 @njit(**entry_options)

@@ -8,6 +8,12 @@ than their distance from x; each is integrated by Gauss's rule. Parts that have 
 v serve all points. About a node of its own, polar coordinates in the tangent plane take the singularity away, from the
 node to each of the four sides.
 
+Also here: those of mode 2 for a current that is tangent to the tile. With J_f = sum_j l_j(y_f) [q_j - n_f (n_f.q_j)] at
+finer nodes f the entries p.[I_f (n.J_f) - J_f (n.I_f)] of p = a, b at x, where n is the normal, are
+
+    (p.I_j) (n.q_j) - (p.q_j) (n.I_j) - sum_f l_j(y_f) [(p.I_f) (n.n_f) - (n.I_f) (p.n_f)] n_f.q_j,
+    I_j = sum_f l_j(y_f) I_f
+
 Sources: [DR84]; Derivations, F36.
 """
 
@@ -267,3 +273,66 @@ def tile_rows(
                 for i in range(p):
                     for j in range(p):
                         out[pair, c, i * p + j] = total[c, i, j]
+
+
+@njit(**entry_options)
+def tangent_rows(found, tile, normals, a, b, finer, at_finer, q, first, last, out):
+    """Fill out (pairs, 2, p p, 2) of currents that are tangent to their tiles, for pairs first..last.
+
+    Parameters
+    ----------
+    found : (pairs, 3, f) complex
+        I_f.
+    tile : (pairs,)
+    normals, a, b : (pairs, 3)
+        n, and p.
+    finer : (t, f, 3)
+        n_f.
+    at_finer : (f, p p)
+        l_j(y_f).
+    q : (t, p p, 2, 3)
+        Both q_j.
+    """
+    count, nodes = at_finer.shape
+    # I_f, n.I_f and what is along n_f of both p, real and imaginary parts
+    terms, sums = np.empty((20, count)), np.empty((20, nodes))
+    for i in range(first, last):
+        t = tile[i]
+        n0, n1, n2 = normals[i, 0], normals[i, 1], normals[i, 2]
+        for f in range(count):
+            m0, m1, m2 = finer[t, f, 0], finer[t, f, 1], finer[t, f, 2]
+            across = n0 * m0 + n1 * m1 + n2 * m2
+            i0, i1, i2 = found[i, 0, f], found[i, 1, f], found[i, 2, f]
+            lean = n0 * i0 + n1 * i1 + n2 * i2
+            terms[0, f], terms[1, f], terms[2, f], terms[3, f] = i0.real, i0.imag, i1.real, i1.imag
+            terms[4, f], terms[5, f], terms[6, f], terms[7, f] = i2.real, i2.imag, lean.real, lean.imag
+            for row in range(2):
+                p = a if row == 0 else b
+                p0, p1, p2 = p[i, 0], p[i, 1], p[i, 2]
+                rest = (p0 * i0 + p1 * i1 + p2 * i2) * across - lean * (p0 * m0 + p1 * m1 + p2 * m2)
+                at = 8 + 6 * row
+                terms[at, f], terms[at + 1, f] = rest.real * m0, rest.imag * m0
+                terms[at + 2, f], terms[at + 3, f] = rest.real * m1, rest.imag * m1
+                terms[at + 4, f], terms[at + 5, f] = rest.real * m2, rest.imag * m2
+        for row in range(20):
+            for j in range(nodes):
+                sums[row, j] = 0.0
+            for f in range(count):
+                value = terms[row, f]
+                for j in range(nodes):
+                    sums[row, j] += value * at_finer[f, j]
+        for row in range(2):
+            p = a if row == 0 else b
+            p0, p1, p2 = p[i, 0], p[i, 1], p[i, 2]
+            at = 8 + 6 * row
+            for j in range(nodes):
+                through = p0 * sums[0, j] + p1 * sums[2, j] + p2 * sums[4, j]
+                turned = p0 * sums[1, j] + p1 * sums[3, j] + p2 * sums[5, j]
+                for c in range(2):
+                    q0, q1, q2 = q[t, j, c, 0], q[t, j, c, 1], q[t, j, c, 2]
+                    nq, pq = n0 * q0 + n1 * q1 + n2 * q2, p0 * q0 + p1 * q1 + p2 * q2
+                    real = sums[at, j] * q0 + sums[at + 2, j] * q1 + sums[at + 4, j] * q2
+                    imaginary = sums[at + 1, j] * q0 + sums[at + 3, j] * q1 + sums[at + 5, j] * q2
+                    out[i, row, j, c] = complex(
+                        through * nq - pq * sums[6, j] - real, turned * nq - pq * sums[7, j] - imaginary
+                    )

@@ -27,8 +27,8 @@ from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, boundary_name, scalar_boundaries
 from creeping.field.equation.body_tiles import body_tiles
 from creeping.field.equation.currents import inside_points
-from creeping.field.equation.matrix import EACH, VECTOR, Matrix
-from creeping.field.equation.solving import PER_NODE, PRODUCTS, SUM, SUM_VECTOR, plan_of
+from creeping.field.equation.effort import PRODUCTS, Load, load_of, load_on, pair_seconds, plan_of
+from creeping.field.equation.matrix import Matrix
 from creeping.field.tmatrix.mirrors import mirrors_of, no_mirrors
 from creeping.field.tmatrix.result import TMatrix
 from creeping.field.tmatrix.solved_waves import SolvedWaves
@@ -114,14 +114,14 @@ def t_matrix(
     degree = order_for(k * radius) if order is None else whole_number(order, "order")
     matrix = Matrix(tiles, k, kind)
     mirrors = mirrors_of(matrix, middle)
-    plan = plan_for(len(tiles.points), kind, degree, len(mirrors.images))
+    plan = plan_for(load_on(tiles, FINER * k, kind), kind, degree, len(mirrors.images))
     what = f"the T-matrix of order {degree} at wavenumber {k:g} by {len(tiles.points)} nodes"
+    within_budget(plan.memory, what, "lower the wavenumber, or let creeping.solve serve for few incidences")
     if plan.seconds > seconds:
         raise InvalidInputError(
             f"{what} takes about {plan.seconds:.2g} s, more than the {seconds:g} s that it may take; give seconds=, "
             "or a lower wavenumber; creeping.solve and rays serve for few incidences"
         )
-    within_budget(plan.memory, what, "lower the wavenumber, or let creeping.solve serve for few incidences")
     tell(f"{what}: about {plan.seconds:.2g} s and {plan.memory / 1e9:.2g} GB")
     planes = mirrors if plan.direct else no_mirrors(matrix)
     solved = SolvedWaves(matrix, middle, degree, planes, tell, direct=plan.direct)
@@ -158,22 +158,20 @@ class Plan(NamedTuple):
     direct: bool
 
 
-def plan_for(nodes: int, kind: Boundary, order: int, parts: int = 1) -> Plan:
-    """What a T-matrix from so many nodes takes, of a body of so many parts that are images of each other."""
-    c = 2 if kind.kind == "conductor" else 1
+def plan_for(load: Load, kind: Boundary, order: int, parts: int = 1) -> Plan:
+    """What a T-matrix takes by what the equation does, of a body of so many parts that are images of each other."""
+    nodes, c = load.nodes, 2 if kind.kind == "conductor" else 1
     n, waves = float(c * nodes), float(vector_count(order) if c == 2 else count(order))
     # values of all waves, waves at the nodes of a part, and the matrix itself
     tables = 8 * n * waves + 80 * n * waves / parts + 64 * waves**2 + 2e4 * n
     memory = 8 * n**2 / parts + tables
     if memory <= DENSE * budget():
-        pairs = 2 * float(nodes) ** 2 * EACH * (VECTOR if c == 2 else 1.0) + 2 * nodes * PER_NODE * c
         own, each = n / parts, waves / parts
         solved = 8 / 3 * own**3 + 8 * own**2 * each + 8 * own * each**2
         added = 2 * n**2 / parts * (2 + np.log2(parts)) * PER_SUM
-        return Plan((pairs / parts + parts * solved / RATE + added) / thread_count(), memory, True)
-    each = SUM_VECTOR if c == 2 else SUM
-    seconds = 2 * nodes * PER_NODE * c / thread_count() + PRODUCTS * waves * each * nodes
-    return Plan(seconds, 80 * n * waves + 2e4 * n, False)
+        made = (pair_seconds(nodes, kind) + load.near) / parts
+        return Plan(made + (parts * solved / RATE + added) / thread_count(), memory, True)
+    return Plan(load.seconds + PRODUCTS * waves * load.product, max(load.memory, 80 * n * waves + 2e4 * n), False)
 
 
 def expected(body: Surface, wavenumber: float, boundary: BoundaryLike) -> Plan:
@@ -181,8 +179,7 @@ def expected(body: Surface, wavenumber: float, boundary: BoundaryLike) -> Plan:
     kinds = scalar_boundaries(boundary)
     kind = CONDUCTOR if len(kinds) == 2 else kinds[0]
     radius = 0.5 * float(np.linalg.norm(np.ptp(np.asarray(body.bounds, dtype=float), axis=0)))
-    nodes = plan_of(body, wavenumber, boundary).nodes
-    return plan_for(int(FINER**2 * nodes), kind, order_for(wavenumber * radius))
+    return plan_for(load_of(body, FINER * wavenumber, kind), kind, order_for(wavenumber * radius))
 
 
 def pays(body: Surface, wavenumber: float, boundary: BoundaryLike, incidences: int) -> bool:

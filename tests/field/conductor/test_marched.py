@@ -7,7 +7,7 @@ import shared_bodies as sc
 import creeping as cr
 from creeping.field.boundary import ELECTRIC_HARD, HARD
 from creeping.field.conductor import on_body
-from creeping.field.equation import solving
+from creeping.field.equation import effort
 from creeping.field.marching.fan_waves import fan_waves
 from creeping.field.strip_waves import modes_on_strip
 from creeping.geometry.quadrature import body_nodes
@@ -49,7 +49,7 @@ def twisted():
 
 def test_ground_behind_rays_that_have_detached_has_its_current(twisted, rng, monkeypatch):
     # the march is asked here, not lit ground
-    monkeypatch.setattr(solving, "SECONDS", 0.0)
+    monkeypatch.setattr(effort, "SECONDS", 0.0)
     nodes = body_nodes(twisted.body, K)
     dark = nodes.normals @ twisted.line.direction > 0.1
     at = rng.choice(np.flatnonzero(dark), 50)

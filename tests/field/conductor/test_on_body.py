@@ -8,7 +8,7 @@ from body_checks import directions
 import creeping as cr
 from creeping.errors import InvalidInputError
 from creeping.field.conductor.on_body import crosses
-from creeping.field.equation import solving
+from creeping.field.equation import effort
 from creeping.field.far_result import spherical_frame
 from creeping.geometry.quadrature import body_nodes
 
@@ -125,7 +125,7 @@ def test_bad_polarisations(ball, polarisation, message):
 
 def test_where_rays_end_the_status_says_so(monkeypatch):
     # which is no matter of lit ground
-    monkeypatch.setattr(solving, "SECONDS", 0.0)
+    monkeypatch.setattr(effort, "SECONDS", 0.0)
     body = sc.TwistedEllipsoid()
     fan = cr.launch(cr.DirectFlow(body), cr.shadow_line(body, direction=OBLIQUE), length=4.0, n_rays=48)
     nodes = body_nodes(body, 6.0)

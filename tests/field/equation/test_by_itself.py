@@ -5,7 +5,7 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.field.equation import solving
+from creeping.field.equation import effort
 from creeping.geometry.quadrature import body_nodes
 from studies.accuracy.bodies import DIPOLE_DEPTHS, bodies
 from studies.accuracy.joints import CASES, spread
@@ -70,7 +70,7 @@ def test_the_equation_is_taken_by_itself_where_expansions_leave_much(monkeypatch
     found = currents.on_body(r).values
     np.testing.assert_allclose(found, sphere.surface_field(4.4934094579, 1.0, r @ OBLIQUE, "hard"), atol=2e-3)
     # concave ground: one bounce where it would take too long
-    monkeypatch.setattr(solving, "SECONDS", 0.0)
+    monkeypatch.setattr(effort, "SECONDS", 0.0)
     assert not cr.surface_currents(fan_of(sc.TwistedEllipsoid(), DIP), wavenumber=4.0, boundary="hard").solved
 
 
@@ -107,7 +107,7 @@ def test_what_it_refuses(ellipsoid, monkeypatch):
     fan = fan_of(CASES["capsule 5.3"][0], (np.sin(0.9), 0, np.cos(0.9)))
     with pytest.raises(cr.InvalidInputError, match="not solved at wavenumber 4: give solve=True"):
         cr.surface_currents(fan, wavenumber=4.0, boundary="pec", solve=False)
-    monkeypatch.setattr(solving, "SECONDS", 0.0)
+    monkeypatch.setattr(effort, "SECONDS", 0.0)
     for ask in (
         lambda: cr.conductor_current(fan, [(0.0, 1.0, 0.0)], wavenumber=4.0),
         lambda: cr.conductor_field(fan, [(3.0, 0, 0)], wavenumber=4.0),

@@ -7,7 +7,7 @@ import trimesh
 import creeping as cr
 import scatterers as sc
 from creeping.field.boundary import HARD
-from creeping.field.equation.body_tiles import RULES, facet_tiles
+from creeping.field.equation.body_tiles import COARSE_RULES, RULES, facet_tiles
 from creeping.geometry.patches import facet_patches, halved, sides_of
 from tests.reference import sphere, stored
 
@@ -49,9 +49,13 @@ def test_a_cube_of_irregular_triangles_is_a_cube(times, kind):
     assert np.mean(true < far.error) > 0.8 and np.median(far.error / true) < 12
 
 
-@pytest.mark.parametrize("rule", RULES, ids=lambda rule: f"{'squares' if rule.squares else 'triangles'} {rule.p}")
+@pytest.mark.parametrize(
+    "rule",
+    [*RULES, *COARSE_RULES],
+    ids=lambda rule: f"{'squares' if rule.squares else 'triangles'} {rule.p}, {rule.side:g}",
+)
 def test_every_rule_knows_its_error_at_edges(rule, monkeypatch):
-    monkeypatch.setattr("creeping.field.equation.body_tiles._chosen", lambda body, wavelength: rule)
+    monkeypatch.setattr("creeping.field.equation.body_tiles._chosen", lambda *problem: rule)
     # another cube than the one that set what they lack, and turned
     turn = trimesh.transformations.random_rotation_matrix(np.array([0.1, 0.5, 0.9]))[:3, :3]
     mesh = cube(1, seed=8)
@@ -60,7 +64,8 @@ def test_every_rule_knows_its_error_at_edges(rule, monkeypatch):
     far, exact = solution.far_field(R @ turn.T), CUBE["hard"][:, 0]
     true = np.abs(far.total - exact)
     assert np.mean(true < far.error) > 0.8 and 1 < np.median(far.error / true) < 8
-    assert rms(far.total, exact) < {(False, 1): 1e-2, (True, 5): 2e-4}.get((rule.squares, rule.p), 4e-3)
+    least = {(False, 1): 1e-2, (True, 5): 2e-4}.get((rule.squares, rule.p), 4e-3)
+    assert rms(far.total, exact) < (2 if rule in COARSE_RULES else 1) * least
 
 
 def test_tiles_close_have_the_area_and_meet_at_edges():

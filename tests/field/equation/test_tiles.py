@@ -5,8 +5,8 @@ import pytest
 import shared_bodies as sc
 from numpy.testing import assert_allclose
 
-from creeping.field.boundary import HARD, Boundary
-from creeping.field.equation.matrix import Matrix, Places
+from creeping.field.boundary import CONDUCTOR, HARD, Boundary
+from creeping.field.equation.matrix import TANGENT, Matrix, Places
 from creeping.field.equation.tiles import tiles_for
 from creeping.geometry.covering import patches_of
 
@@ -104,3 +104,27 @@ def test_tiles_know_what_is_inside(body):
     x = np.concatenate([x, near])
     clear = np.abs(body.level(x)) > 1e-4
     np.testing.assert_array_equal(tiles.inside(x)[clear], (body.level(x) < 0)[clear])
+
+
+def test_currents_are_tangent_to_tiles_next_to_points(rng):
+    """The compiled sums are those over finer nodes of J less its part along the normal there."""
+    tiles = tiles_for(patches_of(sc.Torus(R=1.0, r=0.4))[:1], 4.0)
+    matrix = Matrix(tiles, 4.0, CONDUCTOR)
+    places = Places.at(tiles.points[:3] + 0.05 * tiles.normals[:3], tiles.normals[:3])
+    targets, _, found = matrix.near(places, "double")
+    finer = tiles.with_nodes(tiles.p + TANGENT)
+    starts, _ = near = tiles.near(places.points)
+    tile = np.repeat(np.arange(tiles.count), np.diff(starts))
+    by_u, by_v = tiles.onto(finer.p)
+    values = rng.normal(size=(tiles.count, tiles.p**2, 2))
+    a, b = (part.reshape(tiles.count, -1, 3) for part in (matrix.nodes.a, matrix.nodes.b))
+    J = a * values[..., :1] + b * values[..., 1:]
+    J = np.einsum("fj,tjx->tfx", np.kron(by_u, by_v), J)
+    n = finer.normals.reshape(tiles.count, -1, 3)
+    J = (J - n * np.sum(n * J, axis=2, keepdims=True))[tile]
+    slopes = finer.rows(places.points, near, 4.0, 2)
+    plain = []
+    for p in (places.a[targets], places.b[targets]):
+        across = np.einsum("pcf,pc,pfx,px->p", slopes, p, J, places.normals[targets])
+        plain.append(across - np.einsum("pcf,pc,pfx,px->p", slopes, places.normals[targets], J, p))
+    assert_allclose(np.einsum("prjc,pjc->rp", found, values[tile]), plain, rtol=1e-10, atol=1e-12)
