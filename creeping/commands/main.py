@@ -227,7 +227,7 @@ def run(
         progress("pictures and files" if pictures else "files")
         drawn_with = backend if pictures else None
         summary["files"], summary["drawn_by"] = _run_results.write_results(
-            output, line, fan, curves, drawn_with, tables
+            output, line, fan, curves, drawn_with, tables, name=title_of(body), **(job.wave if job else {})
         )
         written: dict[str, Any] = {"pictures": pictures, "formats": tables}
         if job:
