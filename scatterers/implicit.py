@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scatterers.base.level_body import LevelBody, numbers, positive
+from scatterers.cached import cached
 from scatterers.exact.body import SHARP, Piece, no_charts
 from scatterers.exact.clipped import clip, creases, march, normals
 from scatterers.expression.parsing import one_sided
@@ -252,7 +253,7 @@ class PiecewiseImplicit(Implicit):
         kept = np.all(np.sum(outward[:, None] * directions, axis=-1) > 0, axis=1)
         return corners[kept], directions[kept], clipped.pieces[kept]
 
-    @cached_property
+    @cached
     def atlas(self) -> Any:
         """Charts of a body without edges and tips; asking others for charts raises an error."""
         sharp = [crease for crease in self._creases if crease.kind in SHARP]

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.base.level_body import Body, positive
+from scatterers.cached import cached
 from scatterers.kernels.compiled import Compiled
 from scatterers.kernels.trigonometry import cos_pi, sin_pi, turns
 from scatterers.sphere_map.star import PeriodicAtlas, PeriodicChart
@@ -59,7 +60,7 @@ class Torus(Body):
             raise ValueError(f"r = {self.r!r} >= R = {self.R!r}: the torus meets itself; give r < R")
         self._set_speed()
 
-    @cached_property
+    @cached
     def bounds(self) -> FloatArray:
         """Box (2, 3) that contains the body, L."""
         half = np.array([self.R + self.r, self.R + self.r, self.r])
@@ -123,7 +124,7 @@ class Torus(Body):
         """Compiled level evaluator."""
         return Compiled(_evaluate, "level", np.array([self.R, self.r]))
 
-    @cached_property
+    @cached
     def atlas(self) -> PeriodicAtlas:
         """One doubly periodic chart."""
         chart = PeriodicChart(self._point, self._tangents)

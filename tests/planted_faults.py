@@ -171,7 +171,7 @@ def main() -> None:
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder) / "tree"
-        shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".git", ".venv", "build", "*.egg-info"))
+        shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".git", ".venv", "dist"))
         if not options.sound and (broken := failure(tree, [])):
             raise SystemExit(f"the suite fails without a fault: {broken}")
         for number, fault in enumerate(drawn(options.count, options.seed)):

@@ -65,6 +65,7 @@ def sphere_fan(sphere_line):
         spreading=spreading,
         spreading_rate=np.tile(-np.sin(t), (rays, 1)),
         curvature=np.ones((rays, len(t))),
+        error=cr.ErrorEstimate(1e-9, 2e-9, 3),
         attenuation=np.tile(t, (rays, 1)),
         caustic_index=(spreading < 0).astype(int),
         status=np.arange(rays) % 3,

@@ -414,10 +414,13 @@ def _title(echo: Echo, name: str) -> str:
     at = f"{hertz[0] / 1e9:g} GHz" if echo.quantity == "rcs" else f"{hertz[0] / 1e3:g} kHz"
     words = [short, "" if len(hertz) > 1 else at]
     if echo.incidence is not None:
-        words.append(f"bistatic, radar at azimuth {echo.incidence[0]:g}°, elevation {echo.incidence[1]:g}°")
+        viewer = "radar" if echo.quantity == "rcs" else "sonar"
+        words.append(f"bistatic, {viewer} at azimuth {echo.incidence[0]:g}°, elevation {echo.incidence[1]:g}°")
     elif len(echo.azimuth) == 1:
         words.append(f"azimuth {echo.azimuth[0]:g}°, elevation {echo.elevation[0]:g}°")
-    return ", ".join(word for word in words if word)
+    off = echo.summary()["error_db_median"]
+    told = "" if off is None else f"; error {off:.1g} dB in the median"
+    return ", ".join(word for word in words if word) + told
 
 
 def summary_of(body: str, request: EchoRequest, echo: Echo, dataset: Any) -> dict[str, Any]:

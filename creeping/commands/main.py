@@ -227,7 +227,7 @@ def run(
         progress("pictures and files" if pictures else "files")
         drawn_with = backend if pictures else None
         summary["files"], summary["drawn_by"] = _run_results.write_results(
-            output, line, fan, curves, drawn_with, tables
+            output, line, fan, curves, drawn_with, tables, name=title_of(body), **(job.wave if job else {})
         )
         written: dict[str, Any] = {"pictures": pictures, "formats": tables}
         if job:
@@ -276,7 +276,10 @@ def _studies() -> Any:
 
     beside = str(Path(__file__).parents[2])
     if not (Path(beside) / "studies" / "__init__.py").is_file():
-        raise InvalidInputError("figures are drawn by `studies`, which only the repository has; run this from a clone")
+        raise InvalidInputError(
+            "figures are drawn by `studies`, which only the repository has, not the installed package: clone it and "
+            "install it as its README says"
+        )
     if beside not in sys.path:
         # first: a figure takes its reference from `tests`, a name that other distributions leave packages of, too
         sys.path.insert(0, beside)
@@ -312,7 +315,7 @@ def figure(
     quick: Annotated[bool, Parameter(negative="", help="Coarser and faster.")] = False,
     json_: Json = False,
 ) -> int:
-    """Draw figures of the paper, each with a sidecar of its parameters, error and seconds."""
+    """Draw figures of the paper, each with a sidecar of its parameters, error and seconds; from a clone alone."""
     studies = _studies()
     from creeping.errors import InvalidInputError, near_names
 

@@ -26,7 +26,7 @@ from creeping.field.uncertainty import far_field_uncertainty
 from creeping.field.validity_range import Validity, validity
 from creeping.files.ffe import grid_directions
 from creeping.geometry.directions import unit_direction, unit_directions
-from creeping.geometry.incident import REMEDY
+from creeping.geometry.incident import REMEDY, PlaneWave, incident_words
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan
@@ -111,6 +111,11 @@ class Job:
             metres=self.unit == "m",
             cure=self.cure,
         )
+
+    @property
+    def wave(self) -> dict[str, Any]:
+        """Wavenumber and boundary, as pictures ask for them."""
+        return {"wavenumber": self.wavenumber, "boundary": self.boundary}
 
     def told(self, unit: str) -> str:
         """Wavenumber and frequency in words."""
@@ -220,7 +225,7 @@ class Job:
 
     def _pictures(self, far: FarField, of: RayFan | Solution, output: Path, backend: str, name: str) -> list[str]:
         names = []
-        title = f"{name}\n{self.told(far.unit)}, {far.boundary}".replace("$", r"\$")
+        title = f"{name}, {_place(of)}\n{self.told(far.unit)}, {far.boundary}{_off(far)}".replace("$", r"\$")
         # cuts of one step are one picture
         cuts: dict[int, dict[str, FarField]] = {}
         for target, piece in zip(self.targets, self._pieces(far), strict=True):
@@ -235,16 +240,27 @@ class Job:
         if far.error_by == "extinction":
             currents = cached_currents(of, self.wavenumber, self.boundary) if isinstance(of, RayFan) else of.currents()
             plotting.currents_picture(
-                output / "field.png", currents, wave=self.told(far.unit), backend=backend, dpi=DPI
+                output / "field.png", currents, wave=self.told(far.unit), name=name, backend=backend, dpi=DPI
             )
             names.append("field.png")
         # at points between rays the field needs a smooth body
         elif isinstance(of, RayFan) and self.boundary != "pec" and not is_piecewise(of.body):
             options: dict[str, Any] = {"wavenumber": self.wavenumber, "boundary": self.boundary, "order": ORDER}
-            options["wave"] = self.told(far.unit)
+            options |= {"wave": self.told(far.unit), "name": name}
             plotting.surface_field_picture(output / "field.png", of, backend=backend, dpi=DPI, **options)
             names.append("field.png")
         return names
+
+
+def _place(of: RayFan | Solution) -> str:
+    """The incident wave, in words."""
+    return incident_words(of.line.source if isinstance(of, RayFan) else PlaneWave(of.directions[0]))
+
+
+def _off(far: FarField) -> str:
+    """How large the error of |f| is, in words; nothing where it is not known."""
+    known = far.error[np.isfinite(far.error)]
+    return f"; error {np.median(known):.1g} {far.unit} in the median" if len(known) else ""
 
 
 def _visible(piece: FarField) -> bool:

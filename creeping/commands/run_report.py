@@ -95,9 +95,18 @@ def _of_the_body(fan: Any) -> dict[str, Any]:
 
 
 def write_results(
-    output: Path, line: Any, fan: Any, curves: list[Any], backend: str | None, formats: Sequence[str] = ("csv",)
+    output: Path,
+    line: Any,
+    fan: Any,
+    curves: list[Any],
+    backend: str | None,
+    formats: Sequence[str] = ("csv",),
+    **wave: Any,
 ) -> tuple[list[str], str | None]:
-    """Write data files and pictures, none without a backend; their names, and what drew the pictures."""
+    """Write data files and pictures, none without a backend; their names, and what drew the pictures.
+
+    ``wave`` is what pictures are told besides: the body's name, wavenumber and boundary.
+    """
     from creeping import files, plotting
     from creeping.errors import InvalidInputError
 
@@ -114,8 +123,8 @@ def write_results(
         write_tables(output / name, formats, what, **{kind: what})
     names, drawn_by = [f"{n}.{kind}" for kind in ("vtp", *formats) for n in tables], None
     if backend is not None:
-        drawn_by = plotting.picture(output / "rays.png", line, fan, curves, backend=backend, dpi=DPI)
-        plotting.parameter_picture(output / "parameters.png", line, fan, curves, dpi=DPI)
+        drawn_by = plotting.picture(output / "rays.png", line, fan, curves, backend=backend, dpi=DPI, **wave)
+        plotting.parameter_picture(output / "parameters.png", line, fan, curves, dpi=DPI, **wave)
         names = ["rays.png", "parameters.png", *names]
     return [*names, "summary.json"], drawn_by
 

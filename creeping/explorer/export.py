@@ -16,7 +16,7 @@ from creeping.files import write_text
 from creeping.rays.transport import Flow
 
 STYLE = """
-#creeping{position:fixed;top:0;right:0;width:340px;max-height:100vh;overflow:auto;box-sizing:border-box;padding:10px;
+#creeping{position:fixed;top:0;right:0;width:380px;max-height:100vh;overflow:auto;box-sizing:border-box;padding:10px;
 background:rgba(255,255,255,.92);font:12px/1.4 sans-serif;color:#222;z-index:10}
 #creeping h1{font-size:14px;margin:0 0 6px}#creeping p{margin:0 0 6px}
 """

@@ -23,7 +23,7 @@ from creeping.plotting.parameter_plane import is_torus
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import split_at_seam
 
-WIDTH, LEFT, RIGHT, TOP, BOTTOM = 360.0, 34.0, 8.0, 8.0, 30.0
+WIDTH, LEFT, RIGHT, TOP, BOTTOM = 360.0, 40.0, 13.0, 8.0, 34.0
 """Of a picture and its margins, in units of the drawing."""
 DRAWN = 48
 """Rays drawn at most."""
@@ -70,19 +70,19 @@ class _Axes:
         low, high = TOP, self.height - BOTTOM
         size = f'width="{WIDTH - LEFT - RIGHT}" height="{high - low}"'
         out = [f'<rect x="{LEFT}" y="{TOP}" {size} fill="none" stroke="#555"/>']
-        text = 'font-size="9" font-family="sans-serif" fill="#333"'
+        text = 'font-size="11" font-family="sans-serif" fill="#333"'
         for value in x_ticks:
             x, _ = self.place(np.array([[value, self.y[0]]]))[0]
             out.append(f'<path d="M{x:.1f},{high}v-3" stroke="#555"/>')
-            out.append(f'<text x="{x:.1f}" y="{high + 11}" text-anchor="middle" {text}>{value:g}</text>')
+            out.append(f'<text x="{x:.1f}" y="{high + 13}" text-anchor="middle" {text}>{value:g}</text>')
         for value in y_ticks:
             _, y = self.place(np.array([[self.x[0], value]]))[0]
             out.append(f'<path d="M{LEFT},{y:.1f}h3" stroke="#555"/>')
-            out.append(f'<text x="{LEFT - 3}" y="{y + 3:.1f}" text-anchor="end" {text}>{value:g}</text>')
+            out.append(f'<text x="{LEFT - 3}" y="{y + 4:.1f}" text-anchor="end" {text}>{value:g}</text>')
         middle = (low + high) / 2
         out.append(f'<text x="{WIDTH / 2}" y="{self.height - 6}" text-anchor="middle" {text}>{x_name}</text>')
-        turned = f'transform="rotate(-90 9 {middle:.1f})"'
-        out.append(f'<text x="9" y="{middle:.1f}" text-anchor="middle" {turned} {text}>{y_name}</text>')
+        turned = f'transform="rotate(-90 10 {middle:.1f})"'
+        out.append(f'<text x="10" y="{middle:.1f}" text-anchor="middle" {turned} {text}>{y_name}</text>')
         return "".join(out)
 
 
@@ -166,7 +166,7 @@ def cut_svg(request: ViewRequest, angles: FloatArray, far: FarField | None) -> s
         colour = EXACT if number == 0 else COLOURS[number - 1]
         dash = f' stroke-dasharray="{DASHES[number]}"' if DASHES[number] else ""
         parts.append(f'<path d="M{across:.0f},{TOP + 8}h16" stroke="{colour}" stroke-width="1.2"{dash}/>')
-        label = f'x="{across + 19:.0f}" y="{TOP + 11}" font-size="9" font-family="sans-serif"'
+        label = f'x="{across + 19:.0f}" y="{TOP + 11}" font-size="11" font-family="sans-serif"'
         parts.append(f'<text {label} fill="#333">{name}</text>')
         across += 80
     ticks = np.arange(low, high + 1, 20.0 if high - low > 40 else 10.0)

@@ -25,7 +25,7 @@ from creeping.rays.fan import RayFan
 PLAIN = "<title>Viser</title>"
 ARCS = {"arc: tilts d": "#ff2060", "tilts d": "#20df80", "turns d about itself": "#2080ff"}
 """Of the handles on the page, in the colours that they have there."""
-_TEXT = 'font-size="9" font-family="sans-serif" fill="#333"'
+_TEXT = 'font-size="11" font-family="sans-serif" fill="#333"'
 
 
 def preview_text(frame: Preview, seconds: float, span: tuple[float, float]) -> str:
@@ -122,11 +122,13 @@ def _bar(name: str, colours: ColourTable, words: tuple[str, str, str]) -> str:
 
 def _keys(colours: dict[str, str]) -> str:
     """Short lines of colours with their names in a row."""
-    step = 352 / len(colours)
+    # room by the length of the name, and as much again as five letters for the line
+    letters = np.cumsum([0, *(len(name) + 5 for name in colours)])
+    starts = 8 + 352 * letters / letters[-1]
     return "".join(
-        f'<path d="M{8 + step * n:.0f},12h12" stroke="{colour}" stroke-width="3"/>'
-        f'<text x="{23 + step * n:.0f}" y="15" {_TEXT}>{name}</text>'
-        for n, (name, colour) in enumerate(colours.items())
+        f'<path d="M{x:.0f},12h12" stroke="{colour}" stroke-width="3"/>'
+        f'<text x="{x + 15:.0f}" y="15" {_TEXT}>{name}</text>'
+        for x, (name, colour) in zip(starts[:-1], colours.items(), strict=True)
     )
 
 

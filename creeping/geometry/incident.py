@@ -114,6 +114,18 @@ class PointSource:
 Incident = PlaneWave | PointSource
 
 
+def incident_words(source: Incident) -> str:
+    """Direction or place of a wave, for titles.
+
+    Examples
+    --------
+    >>> incident_words(PlaneWave((0, 3, 4))), incident_words(PointSource((0, 0, 1.5)))
+    ('d = (0, 0.6, 0.8)', 'source at (0, 0, 1.5)')
+    """
+    kind, place = ("source at", source.position) if isinstance(source, PointSource) else ("d =", source.direction)
+    return f"{kind} ({', '.join(f'{x:.3g}' for x in place)})"
+
+
 def incident_of(direction: ArrayLike | None, source: Incident | None) -> Incident:
     """The incident wave that a caller names in one of two ways.
 

@@ -15,14 +15,18 @@ from functools import cached_property
 
 import numpy as np
 
+from creeping._presenting import brief
 from creeping._typing import Any, ArrayLike, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
+from creeping.field.boundary import BoundaryLike, boundary_name
+from creeping.geometry.checks import unit_of
 from creeping.geometry.directions import unit_direction
-from creeping.geometry.incident import PointSource
+from creeping.geometry.evaluators import speed_of
+from creeping.geometry.incident import Incident, PointSource, incident_words
 from creeping.geometry.piecewise import drawn_mesh
 from creeping.geometry.surface import Surface, normal, size
 from creeping.geometry.triangulation import Triangulation
-from creeping.plotting._strokes import LevelColours, Stroke, strokes
+from creeping.plotting._strokes import LevelColours, Stroke, drawn_curves, drawn_ends, strokes
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowLine
@@ -183,6 +187,8 @@ class Drawing:
         Red, green, blue in 0..1 at the vertices of the mesh; by default the body has one colour.
     source : (3,), optional, L
         The point source of the wave.
+    title : str
+        Body, wave and error, as `caption` has them.
     """
 
     body: Surface
@@ -194,6 +200,7 @@ class Drawing:
     colours: LevelColours
     paint: FloatArray | None = None
     source: FloatArray | None = None
+    title: str = ""
 
     @cached_property
     def incidence(self) -> Mark:
@@ -273,6 +280,31 @@ def _source_view(body: Surface, source: FloatArray, towards: FloatArray) -> View
     return next((view for view in tried if view.visible(body, source[None])[0]), first)
 
 
+def caption(body: Any, source: Incident, error: str = "", more: str = "", *, name: str = "") -> str:
+    """Body, wave and error as a title, with a second line; ``name`` is that of the body, its repr if not given."""
+    first = f"{name or brief(body, 60)}, {incident_words(source)}"
+    return "\n".join(filter(None, ["; ".join(filter(None, [first, error])), more]))
+
+
+def rays_caption(
+    line: ShadowLine,
+    fan: RayFan | None,
+    until: float | None = None,
+    wavenumber: float | None = None,
+    boundary: BoundaryLike = "hard",
+    name: str = "",
+) -> str:
+    """Body, wave and error of rays, and up to where they are drawn; for the arguments see `picture`."""
+    if fan is None:
+        return caption(line.body, line.source, name=name)
+    wave = "k ρ = 10" if wavenumber is None else f"k = {wavenumber:g}/{unit_of(line.body)}"
+    faded = f"rays: paler every 10 dB ({boundary_name(boundary)}, {wave}), to 30 dB or their second caustic"
+    if until is not None or speed_of(line.body) is not None:
+        faded = ""
+    error = f"error of the rays' ends {fan.error.rms:.1e} rms" if fan.error.samples else ""
+    return caption(line.body, line.source, error, faded, name=name)
+
+
 def bare(body: Any, direction: FloatArray, *, view: View | None = None, cells: int = 80) -> Drawing:
     """Compose the picture of a body and a wave alone."""
     mesh, normals = drawn_mesh(body, cells)
@@ -287,6 +319,9 @@ def compose(
     view: View | None = None,
     rays: int = 48,
     until: float | None = None,
+    wavenumber: float | None = None,
+    boundary: BoundaryLike = "hard",
+    name: str = "",
     cells: int = 80,
 ) -> Drawing:
     """Compose the picture of a shadow line, its rays and iso-phase curves; for the arguments see `picture`.
@@ -297,6 +332,8 @@ def compose(
         Fineness of the body, cells along each side of its box.
     """
     body, source = line.body, None
+    ends = drawn_ends(fan, until, wavenumber, boundary)
+    curves = drawn_curves(curves, fan, ends)
     mesh, normals = drawn_mesh(body, cells)
     if isinstance(line.source, PointSource):
         source = np.array(line.source.position)
@@ -312,7 +349,8 @@ def compose(
         camera if view is None else view,
         mesh,
         normals,
-        strokes(line, fan, curves, rays=rays, until=until),
+        strokes(line, fan, curves, rays=rays, ends=ends),
         LevelColours.of(curves),
         source=source,
+        title=rays_caption(line, fan, until, wavenumber, boundary, name),
     )

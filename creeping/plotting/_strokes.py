@@ -1,4 +1,9 @@
-"""What a 3-D picture is made of: polylines on the body with their colours, the same for every drawing library."""
+"""What a 3-D picture is made of: polylines on the body with their colours, the same for every drawing library.
+
+Rays are drawn until their waves have fallen by 30 dB, exp{-ξ Im τ} = 10^(-30/20) with ξ and τ as of
+`creeping.rays.reach`, or until J has its second zero: they have crossed their neighbours twice. What comes later is
+weak, and covers the picture.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -7,10 +12,14 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
+from creeping.field.boundary import BoundaryLike, scalar_boundaries
+from creeping.field.creeping_modes import fock_scale, slowest_decay
 from creeping.geometry.checks import UNKNOWN
+from creeping.geometry.evaluators import speed_of
 from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
+from creeping.rays.reach import IN_RANGE
 from creeping.shadow.line import ShadowLine
 from creeping.shadow.status import STATUSES
 
@@ -22,6 +31,11 @@ FADED, FADED_WIDTH = 0.4, 0.5
 HIDDEN = 0.22  # share of its ink that a line behind the body keeps
 # apart in lightness as well as in hue, and apart from the map of the iso-phase levels
 STATUS_COLOURS = {"attached": "#111111", "occluded": "#e8890c", "concave": "#d6409f"}
+FADES, CROSSED = (10.0, 20.0, 30.0), 2
+"""Decibels by which the wave of a ray has fallen where it is drawn paler and at last no more, and zeros of J that it
+passes at most."""
+PALER = (1.0, 0.6, 0.35)
+"""Opacity of rays between these."""
 LEVEL_NAMES = {"travel_time": "travel time", "eikonal": "eikonal"}
 
 
@@ -61,7 +75,7 @@ def strokes(
     curves: Sequence[IsoPhaseCurve],
     *,
     rays: int,
-    until: float | None = None,
+    ends: FloatArray,
 ) -> list[Stroke]:
     """Everything to be drawn on the body, lowest rank first.
 
@@ -71,15 +85,15 @@ def strokes(
         Shadow line, fan of rays or None, iso-phase curves.
     rays : int
         Rays drawn at most, evenly chosen; all of them would cover the body.
-    until : float, optional
-        Travel time up to which rays are drawn; by default to their end.
+    ends : (3, rays)
+        Travel times at which the rays of the fan get paler, twice, and end, with the iso-phase curves.
     """
     found: list[Stroke] = []
     if fan is not None:
-        found += ray_strokes(fan, rays, np.inf if until is None else until)
+        found += ray_strokes(fan, rays, ends)
     colours = LevelColours.of(curves)
     for curve in curves:
-        bound, free = curve_pieces(curve, fan, curve.points)
+        bound, free = curve_pieces(curve, fan, curve.points, ends)
         # levels are read off the colour bar; a single one has none
         label = "" if colours.high > colours.low or curve is not curves[0] else colours.words(curve.level)
         colour = colours(curve.level)
@@ -92,28 +106,60 @@ def strokes(
     return found
 
 
+def drawn_ends(
+    fan: RayFan | None, until: float | None, wavenumber: float | None = None, boundary: BoundaryLike = "hard"
+) -> FloatArray:
+    """Travel times (3, rays) at which rays get paler and end; for the arguments see `picture`."""
+    if fan is None:
+        return np.zeros((len(FADES), 0))
+    if until is not None:
+        return np.full((len(FADES), len(fan.points)), float(until))
+    crossed = np.asarray(fan.caustic_index) >= CROSSED
+    times = np.asarray(fan.travel_time)
+    ends = np.where(crossed.any(axis=1), times[np.argmax(crossed, axis=1)], np.inf)
+    if speed_of(fan.body) is not None or not len(ends):
+        return np.tile(ends, (len(FADES), 1))
+    # as of reach: the typical ray stands for all
+    typical = max(float(np.median(np.nan_to_num(fan.curvature[:, 0]))), 0.0) or 1 / size(fan.body)
+    k = IN_RANGE * typical if wavenumber is None else wavenumber
+    scale = fock_scale(k, np.array([typical]))
+    decay = min(slowest_decay(kind, scale, fan.points[:, 0]) for kind in scalar_boundaries(boundary))
+    wanted = np.array(FADES) * np.log(10) / 20 / (np.cbrt(k / 2) * decay)
+    faded = np.stack([np.interp(wanted, ray, times, right=np.inf) for ray in np.nan_to_num(fan.attenuation)], axis=1)
+    # of one that detaches before nothing is left on the body; what follows is as long as the longest other
+    longest = np.max(faded[-1], where=np.isfinite(faded[-1]), initial=0.0) or np.inf
+    return np.asarray(np.minimum(np.minimum(faded, longest), ends))
+
+
+def drawn_curves(curves: Sequence[IsoPhaseCurve], fan: RayFan | None, ends: FloatArray) -> list[IsoPhaseCurve]:
+    """Curves of which something is drawn."""
+    return [curve for curve in curves if any(curve_pieces(curve, fan, curve.points, ends))]
+
+
 def curve_pieces(
-    curve: IsoPhaseCurve, fan: RayFan | None, points: FloatArray
+    curve: IsoPhaseCurve, fan: RayFan | None, points: FloatArray, ends: FloatArray | None = None
 ) -> tuple[list[FloatArray], list[FloatArray]]:
     """Pieces of an iso-phase curve where its rays creep, and where they have detached: (k, d) each.
 
-    ``points`` (m, d) are its points, or their parameters. Without the curve's fan nothing counts as detached.
+    ``points`` (m, d) are its points, or their parameters, ``ends`` as of `strokes`, none by default. Without the
+    curve's fan nothing counts as detached, and all is drawn.
     """
     points = np.asarray(points)
-    detached = np.zeros(len(points), dtype=bool)
+    detached, drawn = np.zeros(len(points), dtype=bool), np.ones(len(points), dtype=bool)
     rays = getattr(curve, "rays", np.zeros(0, dtype=int))
     if fan is not None and len(rays) == len(points) and np.max(rays, initial=-1) < len(fan.points):
         start = fan.eikonal[:, 0] - fan.travel_time[0] if curve.of == "eikonal" else np.zeros(len(fan.points))
-        detached = curve.level - start[rays] > fan.detachment[rays]
+        times = curve.level - start[rays]
+        detached = times > fan.detachment[rays]
+        if ends is not None:
+            drawn = times <= ends[-1, rays]
     if curve.closed:
-        points, detached = closed(points), np.append(detached, detached[:1])
-    if not np.any(detached):
-        return [points], []
+        points, detached, drawn = closed(points), np.append(detached, detached[:1]), np.append(drawn, drawn[:1])
     # one point more at either end, so that the parts join
     free = detached.copy()
     free[1:] |= detached[:-1]
     free[:-1] |= detached[1:]
-    return list(runs(points, ~detached)), list(runs(points, free))
+    return list(runs(points, ~detached & drawn)), list(runs(points, free & drawn)) if detached.any() else []
 
 
 def chosen_rays(fan: RayFan, rays: int) -> list[int]:
@@ -136,22 +182,31 @@ def chosen_rays(fan: RayFan, rays: int) -> list[int]:
     return sorted({int(k) for k in after - nearer_before})
 
 
-def ray_strokes(fan: RayFan, rays: int, until: float, *, spacing: float = 0.015) -> list[Stroke]:
+def ray_strokes(fan: RayFan, rays: int, ends: FloatArray, *, spacing: float = 0.015) -> list[Stroke]:
     """Chosen rays up to detachment, and faint beyond it, where they are geodesics but no creeping rays.
 
-    ``spacing`` of the points is relative to the size of the body.
+    ``ends`` as of `strokes`; ``spacing`` of the points is relative to the size of the body.
     """
-    bound, free = [], []
+    free: list[FloatArray] = []
+    bound: tuple[list[FloatArray], ...] = tuple([] for _ in FADES)
     times = np.asarray(fan.travel_time)
     for k in chosen_rays(fan, rays):
         points, detachment = np.asarray(fan.points[k]), float(fan.detachment[k])
         fine, fine_times = refined(points, np.asarray(fan.directions[k]), times, spacing * size(fan.body))
-        ok = np.all(np.isfinite(fine), axis=-1) & (fine_times <= until)
-        bound += list(runs(fine, ok & (fine_times <= detachment)))
-        # one point more, so that the two parts join
-        free += list(runs(fine, ok & (fine_times >= detachment - np.max(np.diff(fine_times), initial=0.0))))
+        ok = np.all(np.isfinite(fine), axis=-1)
+        # one point more, so that parts join
+        more = np.max(np.diff(fine_times), initial=0.0)
+        last = ends[-1, k]
+        free += list(runs(fine, ok & (fine_times <= last) & (fine_times >= detachment - more)))
+        begin = -np.inf
+        for part, end in zip(bound, np.minimum(ends[:, k], detachment), strict=True):
+            part += runs(fine, ok & (fine_times >= begin - more) & (fine_times <= end))
+            begin = end
     found = [Stroke(free, RAY_COLOUR, 0.5, alpha=0.5, label="ray after detachment")] if free else []
-    return found + ([Stroke(bound, RAY_COLOUR, 0.6, label="creeping ray")] if bound else [])
+    # the strongest part stands in the legend
+    for part, alpha in reversed([pair for pair in zip(bound, PALER, strict=True) if pair[0]]):
+        found.append(Stroke(part, RAY_COLOUR, 0.6, alpha=alpha, label="creeping ray" if alpha == 1 else ""))
+    return found
 
 
 def refined(

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from creeping._typing import Any, FloatArray
+from creeping.field.boundary import BoundaryLike
 from creeping.plotting._drawing import Drawing, View, compose
 from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, Stroke, runs
 from creeping.rays.fan import RayFan
@@ -25,6 +26,8 @@ def plot_rays_3d(
     view: View | None = None,
     rays: int = 48,
     until: float | None = None,
+    wavenumber: float | None = None,
+    boundary: BoundaryLike = "hard",
     legend: bool = True,
 ) -> Any:
     """Draw the body, its shadow line, creeping rays and iso-phase curves on matplotlib axes.
@@ -41,7 +44,12 @@ def plot_rays_3d(
     rays : int
         Rays drawn at most.
     until : float, optional
-        Travel time up to which rays are drawn; by default to their end.
+        Travel time up to which rays are drawn; by default until their waves have fallen by 30 dB, or they have crossed
+        their neighbours twice.
+    wavenumber : float, optional, 1/L
+        Of these waves; that at which k rho = 10 if not given.
+    boundary : "hard", "soft", "pec" or ImpedanceBoundary
+        Of these waves; on a hard body they fall most slowly.
     legend : bool
         Whether to add a legend and the colour bar of the levels.
 
@@ -53,7 +61,8 @@ def plot_rays_3d(
         from matplotlib import pyplot
 
         ax = pyplot.figure(figsize=(6.4, 5.2), dpi=150).add_subplot(projection="3d")
-    drawing = compose(line, fan, curves, view=view, rays=rays, until=until)
+    shown: dict[str, Any] = {"rays": rays, "until": until, "wavenumber": wavenumber, "boundary": boundary}
+    drawing = compose(line, fan, curves, view=view, **shown)
     draw(ax, drawing)
     if legend:
         drawing.add_legend(ax.figure)

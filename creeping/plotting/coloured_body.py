@@ -14,9 +14,10 @@ from creeping.field.comparison import decibels, shown_range
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
 from creeping.geometry.checks import unit_of
+from creeping.geometry.incident import PlaneWave
 from creeping.geometry.parts import why_no_rays
 from creeping.geometry.surface import Surface, normal
-from creeping.plotting._drawing import Drawing, View, bare, compose
+from creeping.plotting._drawing import Drawing, View, bare, caption, compose
 from creeping.plotting.palette import add_bar, beyond
 from creeping.plotting.pictures import chosen_backend, drawn_page, save_figure
 from creeping.shadow.line import shadow_line
@@ -43,6 +44,7 @@ def currents_picture(
     view: View | None = None,
     span: float = 60.0,
     wave: str = "",
+    name: str = "",
     cells: int | None = None,
     dpi: int = 300,
 ) -> str:
@@ -55,7 +57,7 @@ def currents_picture(
     currents : SurfaceCurrents
     incident : {"theta", "phi"}, optional
         Polarisation of the wave that a conductor's currents belong to; the rms of both if not given.
-    backend, view, span, wave, cells, dpi
+    backend, view, span, wave, name, cells, dpi
         As of `surface_field_picture`.
 
     Returns
@@ -76,10 +78,11 @@ def currents_picture(
     asked: Any = {"view": view, "cells": cells or cells_of(body, k)}
     direction = currents.direction
     drawing = bare(body, direction, **asked) if why_no_rays(body) else compose(shadow_line(body, direction), **asked)
+    drawing = replace(drawing, title=caption(body, PlaneWave(direction), name=name))
     levels = current_levels(currents, drawing.mesh.vertices, incident)
-    name = {"soft": "|∂u/∂n|/k", "conductor": "|n × H|"}.get(currents.boundary.kind, "|u|")
+    what = {"soft": "|∂u/∂n|/k", "conductor": "|n × H|"}.get(currents.boundary.kind, "|u|")
     wave = wave or f"k = {k:g}/{unit_of(currents.body)}"
-    label = f"20 log$_{{10}}${name} (dB)\n{wave}, {currents.boundary.kind}"
+    label = f"20 log$_{{10}}${what} (dB)\n{wave}, {currents.boundary.kind}"
     return save_painted(path, drawing, levels, span=span, label=label, bare="no current", backend=backend, dpi=dpi)
 
 

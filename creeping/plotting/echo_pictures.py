@@ -10,7 +10,8 @@ from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.comparison import shown_range
 from creeping.field.frequency import suited
-from creeping.plotting.far_cuts import Curve, draw_cut, dressed, minus
+from creeping.field.impulse import range_profile
+from creeping.plotting.far_cuts import Curve, band_words, draw_cut, dressed, heights_of, minus
 from creeping.plotting.palette import GREY, add_bar, beyond, curve_style
 from creeping.plotting.pictures import add_legend, axes_or_new, new_figure, save_figure
 
@@ -56,7 +57,7 @@ def echo_cut_picture(
 def draw_echo_cut(ax: Any, echo: "Echo", span: float = SPAN) -> None:
     """Draw an echo of several angles at its first wavenumber, on straight or polar axes."""
     curves = _curves(echo, (slice(None), 0))
-    heights = shown_range([curve.levels for curve in curves], span)
+    heights = heights_of(curves, span)
     curves = _told_if_low(curves, heights[0])
     draw_cut(ax, np.radians(echo.angles), curves, heights, level=_level(echo), angle_name=echo.angle_name)
 
@@ -75,7 +76,8 @@ def echo_band_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str 
 def draw_echo_band(ax: Any, echo: "Echo", span: float = SPAN) -> None:
     """Draw an echo against frequency at its first angle."""
     curves = _curves(echo, (0, slice(None)))
-    low, high = shown_range([curve.levels for curve in curves], span)
+    low, high = heights_of(curves, span)
+    name = band_words(curves, low, high)
     curves = _told_if_low(curves, low)
     scale, unit = suited(float(echo.hertz.max()))
     x = echo.hertz / scale
@@ -83,7 +85,8 @@ def draw_echo_band(ax: Any, echo: "Echo", span: float = SPAN) -> None:
         floor = low - (high - low)
         if curve.band is not None:
             band = np.maximum(curve.band, floor)
-            ax.fill_between(x, *band, color=curve.style["color"], alpha=0.18, linewidth=0)
+            ax.fill_between(x, *band, label=name, color=curve.style["color"], alpha=0.18, linewidth=0)
+            name = "_one entry is enough"
         ax.plot(x, np.maximum(curve.levels, floor), label=curve.label, **curve.style)
     doubtful = echo.unresolved[:, 0].any(axis=0)
     if doubtful.any():
@@ -187,7 +190,10 @@ def range_picture(
     title: str = "",
     dpi: int = 200,
 ) -> None:
-    """Write a PNG of range profiles by channel over the ranges ``span``, m, as far as they reach."""
+    """Write a PNG of range profiles by channel over the ranges ``span``, m, as far as they reach.
+
+    Beside them stands the window's own profile about the strongest echo: what is no higher may be its side lobe.
+    """
     figure = new_figure((6.4, 4.2))
     figure.set_layout_engine("constrained")
     ax = figure.add_subplot()
@@ -196,10 +202,17 @@ def range_picture(
     # the legend lists what was drawn last first
     for number, (channel, found) in reversed(list(enumerate(profiles.items()))):
         ax.plot(found.range, np.maximum(curves[channel], low - 1), label=channel, **curve_style(number))
+    strongest = max(profiles.values(), key=lambda found: float(np.max(np.abs(found.values))))
+    alone = np.abs(range_profile(np.ones(len(echo.wavenumbers)), echo.wavenumbers).values)
+    size = np.abs(strongest.values)
+    alone = np.roll(alone, int(np.argmax(size)) - int(np.argmax(alone))) * float(np.max(size))
+    look: dict[str, Any] = {"color": GREY, "alpha": 0.2, "linewidth": 0, "label": "strongest echo with side lobes"}
+    ax.fill_between(strongest.range, low - 1, np.maximum(echo.levels(alone), low - 1), **look)
     reach = next(iter(profiles.values())).range
     ax.set_xlim(max(span[0], reach[0]), min(span[1], reach[-1]))
     ax.set_ylim(low, high)
-    dressed(ax, "range along the line of sight (m), from the radar", _level(echo), title)
+    viewer = "radar" if echo.quantity == "rcs" else "sonar"
+    dressed(ax, f"range along the line of sight (m), away from the {viewer}", _level(echo), title)
     add_legend(ax, fresh=True)
     save_figure(figure, path, dpi)
 

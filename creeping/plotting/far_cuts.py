@@ -1,14 +1,13 @@
 """Pictures of the far field in one plane: decibels against the angle, over straight axes or round a circle.
 
-Also here: pictures that results draw of their levels: a far field against the angle, a map's error against the ray's
-length.
+Also here: the picture that a far field draws of itself against the angle.
 """
 
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,20 +16,15 @@ import numpy as np
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.field.comparison import cross_section_decibels, decibels, shown_range
-from creeping.plotting.palette import COLOURS, EXACT, curve_style
-from creeping.plotting.pictures import add_legend, new_figure, save_figure, wave_title
+from creeping.plotting._cut_angles import CutAngles, cut_angles
+from creeping.plotting.palette import COLOURS, EXACT, GREY, curve_style
+from creeping.plotting.pictures import add_legend, axes_or_new, new_figure, save_figure, wave_title
 
 if TYPE_CHECKING:
     from creeping.field.far_result import FarField
-    from creeping.phaseflow.phase_map import PhaseMap
-from typing import TYPE_CHECKING
 
-from creeping._presenting import brief
-from creeping.geometry.checks import unit_of
-from creeping.plotting._cut_angles import CutAngles, cut_angles
-from creeping.plotting.palette import GREY
-from creeping.plotting.pictures import axes_or_new
-
+ABOVE, NARROW = 10.0, 10.0
+"""Room for bands over the curves, dB, and range up to which an axis ends at whole decibels rather than fives."""
 KINDS = ("cartesian", "polar")
 QUANTITIES = {
     "amplitude": ("20 log$_{10}$|f| (dB re 1 %s)", decibels),
@@ -104,7 +98,7 @@ def far_cut_picture(
     kind : str
         "cartesian", or "polar": angle 0 at the top, clockwise.
     quantity : str
-        "amplitude", 20 log10 |f|, or "rcs", 10 log10(4π|f|²): dBsm where lengths are known to be metres.
+        "amplitude", 20 log10 |f|, or "rcs", 10 log10(4π|f|²): dBsm of conductors in metres.
     exact : complex (m,) or (m, 2, 2), L, optional
         Reference, drawn thin and black under the others.
     parts : bool
@@ -132,14 +126,41 @@ def far_cut_picture(
         raise InvalidInputError(f"kind {kind!r} is unknown; give {' or '.join(KINDS)}")
     angle = checked_angles(angles)
     curves = cut_curves(len(angle), fields, quantity=quantity, exact=exact, parts=parts, components=components)
-    heights = shown_range([curve.levels for curve in curves if curve.thick], span)
+    heights = heights_of(curves, span)
     figure = new_figure((6.4, 4.2) if kind == "cartesian" else (6.4, 6.4))
     figure.set_layout_engine("constrained")
     ax = figure.add_subplot(projection="polar" if kind == "polar" else None)
-    draw_cut(ax, angle, curves, heights, level=level_name(quantity, unit or _unit(fields)), angle_name=angle_name)
+    level = level_name(quantity, unit or _unit(fields), [getattr(one, "total", one) for one in fields.values()])
+    draw_cut(ax, angle, curves, heights, level=level, angle_name=angle_name)
     ax.set_title(_title(fields) if title is None else title, fontsize=9)
     add_legend(ax, fresh=True)
     save_figure(figure, path, dpi)
+
+
+def heights_of(curves: Sequence[Curve], span: float) -> tuple[float, float]:
+    """Lowest and highest decibel of an axis for thick curves and their bands, at most ``span`` below the curves.
+
+    Of a band what 95 of 100 values reach counts, as of stated errors, and at most `ABOVE` over the curves.
+    """
+    thick = [curve for curve in curves if curve.thick]
+    levels = [curve.levels for curve in thick]
+    _, top = shown_range(levels, span)
+    ends: list[FloatArray] = []
+    for band in (curve.band for curve in thick if curve.band is not None):
+        below, above = (end[np.isfinite(end)] for end in band)
+        ends += [np.maximum(np.quantile(below, [0.05]), top - span)] if len(below) else []
+        ends += [np.minimum(np.quantile(above, [0.95]), top + ABOVE)] if len(above) else []
+    low, high = shown_range([*levels, *ends], span + ABOVE)
+    if high - low <= NARROW:
+        low, high = shown_range([*levels, *ends], span + ABOVE, step=1.0)
+    return max(low, top - span), high
+
+
+def band_words(curves: Sequence[Curve], low: float, high: float) -> str:
+    """What the legend calls the bands of curves on an axis."""
+    bands = [curve.band for curve in curves if curve.band is not None]
+    beyond = any(bool(np.any(band[0] < low) or np.any(band[1] > high)) for band in bands)
+    return "stated error, in part beyond the axis" if beyond else "stated error"
 
 
 def draw_cut(
@@ -163,13 +184,16 @@ def draw_cut(
         _round_axes(ax, (low, high), level, angle_name)
     else:
         _straight_axes(ax, angle, (low, high), level, angle_name)
+    name = band_words(curves, low, high)
     for curve in reversed(curves):
         # lines that leave the axes through the floor are cut there; round a circle they would pass the centre
         levels = np.maximum(curve.levels, low if polar else low - (high - low))
         across = angle if polar else np.degrees(angle)
         if curve.band is not None:
             band = np.maximum(curve.band, low if polar else low - (high - low))
-            ax.fill_between(across, *band, color=curve.style["color"], alpha=0.18, linewidth=0, zorder=0.5)
+            look = {"color": curve.style["color"], "alpha": 0.18, "linewidth": 0, "zorder": 0.5}
+            ax.fill_between(across, *band, label=name, **look)
+            name = "_one entry is enough"
         ax.plot(across, levels, label=curve.label, **curve.style)
     _hatch(ax, angle, curves)
 
@@ -191,9 +215,9 @@ def _hatch(ax: Any, angle: FloatArray, curves: Sequence[Curve]) -> None:
         label = "_one entry is enough"
 
 
-def level_name(quantity: str, unit: str) -> str:
-    """Name of the levels on an axis: decibels relative to a unit of length, of area dBsm if that is the metre."""
-    if quantity == "rcs" and unit == "m":
+def level_name(quantity: str, unit: str, totals: Iterable[Any]) -> str:
+    """Name of the levels on an axis: decibels relative to a unit of length or area, dBsm for conductors in metres."""
+    if quantity == "rcs" and unit == "m" and any(np.ndim(total) == 3 for total in totals):
         return "4π|f|$^2$ (dBsm)"
     return QUANTITIES[quantity][0] % unit.replace("$", r"\$")
 
@@ -384,7 +408,7 @@ def plot_far(
     ax : matplotlib.axes.Axes, optional
         By default those of a new figure.
     quantity : {"rcs", "amplitude"}
-        10 log10(4π|f|²), dBsm where lengths are known to be metres, or 20 log10 |f|.
+        10 log10(4π|f|²), dBsm of conductors in metres, or 20 log10 |f|.
     parts : bool
         Whether to draw the field's ``parts`` as thin lines.
     components : sequence of str
@@ -415,11 +439,13 @@ def plot_far(
         given = checked_angles(angles)
         cut = CutAngles(given, angle_name, np.arange(len(given)))
     curves = cut_curves(len(cut.values), {"total": far}, quantity=quantity, parts=parts, components=components)
-    heights = shown_range([curve.levels for curve in curves if curve.thick], span)
+    heights = heights_of(curves, span)
     curves = [curve.ordered(cut.order, _short(curve.label)) for curve in curves]
     fresh, ax = axes_or_new(ax, PAGE)
     unit = unit or far.unit
-    draw_cut(ax, cut.values[cut.order], curves, heights, level=level_name(quantity, unit), angle_name=cut.name)
+    draw_cut(
+        ax, cut.values[cut.order], curves, heights, level=level_name(quantity, unit, [far.total]), angle_name=cut.name
+    )
     _mark(ax, cut.values[cut.order], curves, heights[1])
     if fresh:
         ax.set_title(f"{wave_title(far, unit)} boundary", fontsize=9, parse_math=False)
@@ -440,51 +466,3 @@ def _mark(ax: Any, angle: FloatArray, curves: Sequence[Curve], high: float) -> N
     if np.any(gone):
         height = np.full(int(gone.sum()), high)
         ax.plot(x[gone], height, marker="x", color=GREY, label="not finite", clip_on=False, **look)
-
-
-def plot_growth(flow: PhaseMap, ax: Any = None, *, tolerance: float | None = None, legend: bool | None = None) -> Any:
-    """Draw the error of a phase map against the length of the ray, and the tolerance that it was built for.
-
-    Parameters
-    ----------
-    flow : PhaseMap
-    ax : matplotlib.axes.Axes, optional
-        By default those of a new figure.
-    tolerance : float, optional
-        By default that of the build, if there was one.
-    legend : bool
-        By default on a new figure only.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-
-    Raises
-    ------
-    InvalidInputError
-        If the error has not been measured.
-    """
-    growth, error = flow.growth, flow.error
-    if growth is None and not error.samples:
-        raise InvalidInputError("the error of this map has not been measured; build_phase_map does")
-    fresh, ax = axes_or_new(ax, PAGE)
-    lengths = (flow.horizon,) if growth is None else growth.lengths
-    rms, largest = ((error.rms,), (error.max,)) if growth is None else (growth.rms, growth.max)
-    for number, name, values in ((1, "max", largest), (0, "rms", rms)):
-        ax.plot(lengths, values, marker="os"[number], markersize=4, label=name, **curve_style(number))
-    if growth is not None:
-        ax.plot(lengths[-1:], [growth.bound], "_", color=COLOURS[0], markersize=12, label="bound of the rms")
-    tolerance = flow.parameters.get("tolerance") if tolerance is None else tolerance
-    if tolerance is not None:
-        ax.axhline(tolerance, color=GREY, linewidth=0.9, linestyle=":", label=f"tolerance {tolerance:.3g}")
-    ax.set_yscale("log")
-    weighted = getattr(flow.body, "speed", None) is not None
-    ax.set_xlabel("travel time of the ray" if weighted else f"length of the ray ({unit_of(flow.body)})", fontsize=9)
-    ax.set_ylabel("error of (x, p)", fontsize=9)
-    ax.grid(color="#d9dde0", linewidth=0.5)
-    ax.tick_params(labelsize=8, direction="in", top=True, right=True, width=0.5, which="both")
-    if fresh:
-        # a body may be an expression of the user's and is no formula
-        ax.set_title(f"{brief(flow.body)}, T0 = {flow.horizon:g}", fontsize=9, parse_math=False)
-    add_legend(ax, fresh, legend)
-    return ax

@@ -6,6 +6,7 @@ Sources: Derivations, F9 and F16.
 """
 
 import os
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from creeping.field.on_body import surface_field
 from creeping.field.point_result import SurfaceField
 from creeping.field.surface import scalar_boundary
 from creeping.geometry.checks import unit_of
-from creeping.plotting._drawing import View, compose
+from creeping.plotting._drawing import View, caption, compose
 from creeping.plotting._strokes import chosen_rays
 from creeping.plotting.coloured_body import NOTHING, cells_of, save_painted
 from creeping.plotting.coupling_pictures import with_fronts
@@ -42,6 +43,7 @@ def surface_field_picture(
     fronts: bool = False,
     phase: float = 0.0,
     wave: str = "",
+    name: str = "",
     cells: int | None = None,
     dpi: int = 300,
 ) -> str:
@@ -68,6 +70,8 @@ def surface_field_picture(
         omega t.
     wave : str
         What the picture says of the wave; the wavenumber if not given.
+    name : str
+        What the title calls the body; its repr if not given.
     cells : int, optional
         Fineness of the body, cells along each side of its box; by default eight a wavelength, within 48 to 96.
     dpi : int
@@ -90,6 +94,9 @@ def surface_field_picture(
     k = checked(wavenumber, order)
     drawing = compose(fan.line, view=view, cells=cells or cells_of(fan.body, k))
     field = surface_field(fan, drawing.mesh.vertices, wavenumber=k, boundary=boundary, order=order)
+    known = field.ok & np.isfinite(field.error)
+    off = f"error where OK {np.median(field.error[known]):.1g} in the median" if known.any() else ""
+    drawing = replace(drawing, title=caption(fan.body, fan.line.source, off, name=name))
     if fronts:
         drawing = with_fronts(drawing, field, phase)
     levels = levels_of(_scaled(field, kind))

@@ -1,16 +1,25 @@
-"""Pictures that shadow lines, fans and iso-phase curves draw of themselves, in the plane of parameters or in space."""
+"""Pictures that shadow lines, fans and iso-phase curves draw of themselves, in the plane of parameters or in space.
+
+Also here: the error of a phase map against the length of the ray.
+"""
 
 from collections.abc import Sequence
 
 import numpy as np
 
+from creeping._presenting import brief
 from creeping._typing import Any
 from creeping.errors import InvalidInputError
+from creeping.field.boundary import BoundaryLike
+from creeping.geometry.checks import unit_of
 from creeping.geometry.incident import incident_of_row
-from creeping.plotting._drawing import Drawing, View, compose
+from creeping.phaseflow.phase_map import PhaseMap
+from creeping.plotting._drawing import Drawing, View, compose, rays_caption
 from creeping.plotting._strokes import LEVEL_NAMES
+from creeping.plotting.far_cuts import PAGE
+from creeping.plotting.palette import COLOURS, GREY, curve_style
 from creeping.plotting.parameter_plane import draw_curves, frame, is_torus, page_size, plot_parameters
-from creeping.plotting.pictures import add_legend, axes_or_new, drawn_page
+from creeping.plotting.pictures import TITLE_SIZE, add_legend, axes_or_new, drawn_page
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.curve import ShadowCurve
@@ -33,6 +42,8 @@ def plot_line(
     curves: Sequence[IsoPhaseCurve] = (),
     rays: int = 48,
     until: float | None = None,
+    wavenumber: float | None = None,
+    boundary: BoundaryLike = "hard",
     view: View | None = None,
     legend: bool | None = None,
 ) -> Any:
@@ -50,7 +61,12 @@ def plot_line(
     rays : int
         Rays drawn at most.
     until : float, optional
-        Travel time up to which rays are drawn; by default to their end.
+        Travel time up to which rays are drawn; by default until their waves have fallen by 30 dB, or they have crossed
+        their neighbours twice.
+    wavenumber : float, optional, 1/L
+        Of these waves; that at which k rho = 10 if not given.
+    boundary : "hard", "soft", "pec" or ImpedanceBoundary
+        Of these waves; on a hard body they fall most slowly.
     view : View, optional
         Camera of ``kind="3d"``; by default on the shadow side.
     legend : bool
@@ -65,7 +81,7 @@ def plot_line(
     InvalidInputError
         If the kind is unknown or not that of the axes, or a view is given for the plane.
     """
-    shown: dict[str, Any] = {"rays": rays, "until": until}
+    shown: dict[str, Any] = {"rays": rays, "until": until, "wavenumber": wavenumber, "boundary": boundary}
     if _in_space(ax, kind):
         if ax is None:
             return _page(compose(line, fan, curves, view=view, **shown), legend is not False)
@@ -75,7 +91,11 @@ def plot_line(
     if view is not None:
         raise InvalidInputError("a view is for kind='3d'; the plane of the parameters has none")
     fresh, ax = axes_or_new(ax, page_size(torus=is_torus(line)))
-    return plot_parameters(line, fan, curves, ax=ax, legend=fresh if legend is None else legend, **shown)
+    ax = plot_parameters(line, fan, curves, ax=ax, legend=fresh if legend is None else legend, **shown)
+    if fresh:
+        title = rays_caption(line, fan, until, wavenumber, boundary)
+        ax.set_title(title, fontsize=TITLE_SIZE, loc="left", parse_math=False)
+    return ax
 
 
 def plot_shadow_curve(curve: ShadowCurve, ax: Any = None, **options: Any) -> Any:
@@ -127,6 +147,54 @@ def plot_curve(curve: IsoPhaseCurve, ax: Any = None, *, kind: str | None = None,
         draw_curves(ax, [curve])
         if not framed:
             frame(ax, torus=torus)
+    add_legend(ax, fresh, legend)
+    return ax
+
+
+def plot_growth(flow: PhaseMap, ax: Any = None, *, tolerance: float | None = None, legend: bool | None = None) -> Any:
+    """Draw the error of a phase map against the length of the ray, and the tolerance that it was built for.
+
+    Parameters
+    ----------
+    flow : PhaseMap
+    ax : matplotlib.axes.Axes, optional
+        By default those of a new figure.
+    tolerance : float, optional
+        By default that of the build, if there was one.
+    legend : bool
+        By default on a new figure only.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InvalidInputError
+        If the error has not been measured.
+    """
+    growth, error = flow.growth, flow.error
+    if growth is None and not error.samples:
+        raise InvalidInputError("the error of this map has not been measured; build_phase_map does")
+    fresh, ax = axes_or_new(ax, PAGE)
+    lengths = (flow.horizon,) if growth is None else growth.lengths
+    rms, largest = ((error.rms,), (error.max,)) if growth is None else (growth.rms, growth.max)
+    for number, name, values in ((1, "max", largest), (0, "rms", rms)):
+        ax.plot(lengths, values, marker="os"[number], markersize=4, label=name, **curve_style(number))
+    if growth is not None:
+        ax.plot(lengths[-1:], [growth.bound], "_", color=COLOURS[0], markersize=12, label="bound of the rms")
+    tolerance = flow.parameters.get("tolerance") if tolerance is None else tolerance
+    if tolerance is not None:
+        ax.axhline(tolerance, color=GREY, linewidth=0.9, linestyle=":", label=f"tolerance {tolerance:.3g}")
+    ax.set_yscale("log")
+    weighted = getattr(flow.body, "speed", None) is not None
+    ax.set_xlabel("travel time of the ray" if weighted else f"length of the ray ({unit_of(flow.body)})", fontsize=9)
+    ax.set_ylabel("error of (x, p)", fontsize=9)
+    ax.grid(color="#d9dde0", linewidth=0.5)
+    ax.tick_params(labelsize=8, direction="in", top=True, right=True, width=0.5, which="both")
+    if fresh:
+        # a body may be an expression of the user's and is no formula
+        ax.set_title(f"{brief(flow.body)}, T0 = {flow.horizon:g}", fontsize=9, parse_math=False)
     add_legend(ax, fresh, legend)
     return ax
 

@@ -5,12 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from creeping._typing import Any, FloatArray
+from creeping.field.boundary import BoundaryLike
 from creeping.plotting._strokes import (
     FADED,
     FADED_WIDTH,
     STATUS_COLOURS,
     LevelColours,
     curve_pieces,
+    drawn_curves,
+    drawn_ends,
     line_pieces,
     ray_strokes,
 )
@@ -28,6 +31,8 @@ def plot_parameters(
     ax: Any = None,
     rays: int = 48,
     until: float | None = None,
+    wavenumber: float | None = None,
+    boundary: BoundaryLike = "hard",
     legend: bool = True,
 ) -> Any:
     """Draw the shadow line, creeping rays and iso-phase curves over (phi, theta) in degrees.
@@ -42,7 +47,12 @@ def plot_parameters(
     rays : int
         Rays drawn at most.
     until : float, optional
-        Travel time up to which rays are drawn; by default to their end.
+        Travel time up to which rays are drawn; by default until their waves have fallen by 30 dB, or they have crossed
+        their neighbours twice.
+    wavenumber : float, optional, 1/L
+        Of these waves; that at which k rho = 10 if not given.
+    boundary : "hard", "soft", "pec" or ImpedanceBoundary
+        Of these waves; on a hard body they fall most slowly.
     legend : bool
         Whether to add a legend and the colour bar of the levels.
 
@@ -54,15 +64,15 @@ def plot_parameters(
         from matplotlib import pyplot
 
         ax = pyplot.figure(figsize=page_size(torus=is_torus(line)), dpi=150, layout="constrained").add_subplot()
-    body = line.body
+    body, ends = line.body, drawn_ends(fan, until, wavenumber, boundary)
     if fan is not None:
         # finer than in space: near a pole phi turns fast
-        for stroke in ray_strokes(fan, rays, np.inf if until is None else until, spacing=0.005):
+        for stroke in ray_strokes(fan, rays, ends, spacing=0.005):
             pieces = [
                 piece for points in stroke.lines for piece in split_at_seam(body.parameters(points), closed=False)
             ]
             _add(ax, pieces, color=stroke.colour, linewidth=0.8 * stroke.width, alpha=stroke.alpha, label=stroke.label)
-    colours = draw_curves(ax, curves, fan)
+    colours = draw_curves(ax, drawn_curves(curves, fan, ends), fan, ends)
     for status in STATUSES:
         pieces = _in_plane(body, line_pieces(line, status))
         _add(ax, pieces, color=STATUS_COLOURS[status], linewidth=1.8, label=f"shadow line, {status}", zorder=4)
@@ -77,15 +87,20 @@ def page_size(*, torus: bool) -> tuple[float, float]:
     return (6.4, 5.9) if torus else (6.4, 3.6)
 
 
-def draw_curves(ax: Any, curves: Sequence[IsoPhaseCurve], fan: RayFan | None = None) -> LevelColours:
-    """Draw iso-phase curves, faint where rays of their fan have detached, and return the colours of their levels."""
+def draw_curves(
+    ax: Any, curves: Sequence[IsoPhaseCurve], fan: RayFan | None = None, ends: FloatArray | None = None
+) -> LevelColours:
+    """Draw iso-phase curves, faint where rays of their fan have detached, and return the colours of their levels.
+
+    ``ends`` are those of `creeping.plotting._strokes.drawn_ends`, none by default.
+    """
     colours = LevelColours.of(curves)
     for curve in curves:
         # levels are read off the colour bar; a single one has none
         label = "" if colours.high > colours.low or curve is not curves[0] else colours.words(curve.level)
         bound, free = (
             [piece for part in parts for piece in split_at_seam(part, closed=False)]
-            for parts in curve_pieces(curve, fan, curve.parameters)
+            for parts in curve_pieces(curve, fan, curve.parameters, ends)
         )
         colour = colours(curve.level)
         _add(ax, bound, color=colour, linewidth=1.0, label=label, zorder=3)

@@ -7,7 +7,8 @@ import numpy as np
 
 from creeping._typing import Any
 from creeping.errors import InvalidInputError
-from creeping.plotting._drawing import Drawing, View, compose
+from creeping.field.boundary import BoundaryLike
+from creeping.plotting._drawing import Drawing, View, compose, rays_caption
 from creeping.plotting._strokes import ARROW_COLOUR
 from creeping.plotting.scene import gl_available
 from creeping.rays.fan import RayFan
@@ -17,6 +18,8 @@ from creeping.storage.atomic import written_aside
 
 BACKENDS = ("auto", "pyvista", "matplotlib")
 WIDTH = 6.4  # inches
+TITLE, TITLE_SIZE = 0.16, 8.0
+"""Height of a line of the title, inches, and its letters, points."""
 FINER = 1.6
 """Pixels of what OpenGL renders for each of the file, along a side."""
 Place = tuple[float, float, float, float]  # left, bottom, width, height, as shares of the figure
@@ -32,6 +35,9 @@ def picture(
     view: View | None = None,
     rays: int = 48,
     until: float | None = None,
+    wavenumber: float | None = None,
+    boundary: BoundaryLike = "hard",
+    name: str = "",
     dpi: int = 300,
 ) -> str:
     """Write a PNG of the body with its shadow line, creeping rays and iso-phase curves.
@@ -50,7 +56,14 @@ def picture(
     rays : int
         Rays drawn at most.
     until : float, optional
-        Travel time up to which rays are drawn; by default to their end.
+        Travel time up to which rays are drawn; by default until their waves have fallen by 30 dB, or they have crossed
+        their neighbours twice.
+    wavenumber : float, optional, 1/L
+        Of these waves; that at which k rho = 10 if not given.
+    boundary : "hard", "soft", "pec" or ImpedanceBoundary
+        Of these waves; on a hard body they fall most slowly.
+    name : str
+        What the title calls the body; its repr if not given.
     dpi : int
         Pixels per inch; the figure is 6.4 inches wide, its height follows the body.
 
@@ -67,7 +80,8 @@ def picture(
         If pyvista is asked for and cannot draw here, or the file cannot be written.
     """
     backend = chosen_backend(backend)
-    drawing = compose(line, fan, curves, view=view, rays=rays, until=until)
+    shown: dict[str, Any] = {"rays": rays, "until": until, "wavenumber": wavenumber, "boundary": boundary}
+    drawing = compose(line, fan, curves, view=view, name=name, **shown)
     figure, bar = drawn_page(drawing, backend, dpi)
     drawing.add_legend(figure)
     if drawing.colours.high > drawing.colours.low:
@@ -84,6 +98,9 @@ def parameter_picture(
     *,
     rays: int = 48,
     until: float | None = None,
+    wavenumber: float | None = None,
+    boundary: BoundaryLike = "hard",
+    name: str = "",
     dpi: int = 300,
 ) -> None:
     """Write a PNG of the same in the plane of the body's parameters; see `plot_parameters`.
@@ -97,7 +114,10 @@ def parameter_picture(
 
     figure = new_figure(page_size(torus=is_torus(line)))
     figure.set_layout_engine("constrained")
-    plot_parameters(line, fan, curves, ax=figure.add_subplot(), rays=rays, until=until)
+    shown: dict[str, Any] = {"rays": rays, "until": until, "wavenumber": wavenumber, "boundary": boundary}
+    ax = plot_parameters(line, fan, curves, ax=figure.add_subplot(), **shown)
+    title = rays_caption(line, fan, until, wavenumber, boundary, name)
+    ax.set_title(title, fontsize=TITLE_SIZE, loc="left", parse_math=False)
     save_figure(figure, path, dpi)
 
 
@@ -121,6 +141,7 @@ def drawn_page(drawing: Drawing, backend: str, dpi: int) -> tuple[Any, Place]:
     figure, place = _page(drawing)
     draw = _draw_pyvista if backend == "pyvista" else _draw_matplotlib
     draw(figure, place, drawing, dpi)
+    figure.text(0.02, 0.99, drawing.title, fontsize=TITLE_SIZE, va="top", parse_math=False)
     left, bottom, width, height = place
     return figure, (left + width + 0.02, bottom + 0.12 * height, 0.022, 0.76 * height)
 
@@ -174,7 +195,8 @@ def _page(drawing: Drawing) -> tuple[Any, Place]:
     # neither a strip nor a tower: the rest of the room stays white
     body = float(np.clip(width * (high[1] - low[1]) / (high[0] - low[0]), 2.4, 4.6))
     legend = 0.55 if len({stroke.label for stroke in drawing.strokes} - {""}) > 3 else 0.38
-    height = body + legend + 0.05
+    lines = drawing.title.count("\n") + 1 if drawing.title else 0
+    height = body + legend + 0.05 + TITLE * lines
     return new_figure((WIDTH, height)), (0.01, legend / height, width / WIDTH, body / height)
 
 

@@ -34,7 +34,7 @@ _PLOTS: dict[str, Callable[..., Any]] = {
     "IsoPhaseCurve": line_plots.plot_curve,
     "FarField": far_cuts.plot_far,
     "FieldCut": plane_pictures.plot_field_cut,
-    "PhaseMap": far_cuts.plot_growth,
+    "PhaseMap": line_plots.plot_growth,
     "Coupling": response_plots.plot_coupling,
     "SourcePattern": response_plots.plot_pattern,
     "ImpulseResponse": response_plots.plot_impulse,

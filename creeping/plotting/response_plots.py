@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 from typing import TYPE_CHECKING
 
 from creeping.plotting._cut_angles import cut_angles
-from creeping.plotting.far_cuts import Curve, draw_cut, minus
+from creeping.plotting.far_cuts import Curve, draw_cut, heights_of, minus
 from creeping.plotting.palette import add_bar, beyond
 from creeping.plotting.pictures import wave_title
 
@@ -212,7 +212,7 @@ def plot_pattern(found: "SourcePattern", ax: Any = None, *, span: float = 60.0, 
         )
     cut = cut_angles(found.directions)
     curves = [_curve(found, number).ordered(cut.order, _named(found, number)) for number in range(len(found.sources))]
-    heights = shown_range([curve.levels for curve in curves], span)
+    heights = heights_of(curves, span)
     fresh, ax = axes_or_new(ax, PAGE)
     level = "20 log$_{10}$|F| (dB re no body)"
     draw_cut(ax, cut.values[cut.order], curves, heights, level=level, angle_name=cut.name)

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from creeping._typing import Any, FloatArray
 from creeping.errors import CreepingError
+from creeping.field.boundary import BoundaryLike
 from creeping.plotting._drawing import Drawing, View, compose
 from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, Stroke
 from creeping.rays.fan import RayFan
@@ -57,6 +58,8 @@ def plot_rays_3d(
     view: View | None = None,
     rays: int = 48,
     until: float | None = None,
+    wavenumber: float | None = None,
+    boundary: BoundaryLike = "hard",
     legend: bool = True,
 ) -> Any:
     """Draw the body, its shadow line, creeping rays and iso-phase curves with pyvista.
@@ -73,7 +76,12 @@ def plot_rays_3d(
     rays : int
         Rays drawn at most.
     until : float, optional
-        Travel time up to which rays are drawn; by default to their end.
+        Travel time up to which rays are drawn; by default until their waves have fallen by 30 dB, or they have crossed
+        their neighbours twice.
+    wavenumber : float, optional, 1/L
+        Of these waves; that at which k rho = 10 if not given.
+    boundary : "hard", "soft", "pec" or ImpedanceBoundary
+        Of these waves; on a hard body they fall most slowly.
     legend : bool
         Whether to add a legend, the colour bar of the levels and the axes.
 
@@ -89,7 +97,8 @@ def plot_rays_3d(
     require_gl()
     import pyvista
 
-    drawing = compose(line, fan, curves, view=view, rays=rays, until=until)
+    shown: dict[str, Any] = {"rays": rays, "until": until, "wavenumber": wavenumber, "boundary": boundary}
+    drawing = compose(line, fan, curves, view=view, **shown)
     if plotter is None:
         plotter = pyvista.Plotter(window_size=(1200, 1000))
     draw(plotter, drawing)
@@ -236,6 +245,7 @@ def _add_legend(plotter: Any, drawing: Drawing) -> None:
     for k, (label, colour) in enumerate(entries):
         place = (16, plotter.window_size[1] - 28 * (k + 1))
         plotter.add_text(f"- {label}", position=place, font_size=9, color=colour, name=f"legend {k}")
+    plotter.add_text(drawing.title, position="lower_left", font_size=7, color="black", name="title")
     plotter.add_axes(line_width=3)
     colours = drawing.colours
     if colours.high > colours.low:

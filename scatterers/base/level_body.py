@@ -33,6 +33,7 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
+from scatterers.cached import cached
 from scatterers.speed import as_speed
 
 CLOUDS = (25_000, 100_000)
@@ -202,7 +203,7 @@ class LevelBody(Body):
             return self._map.compiled_level
         return Compiled(self._space.sources["level"], "level", self._space.flat(np.zeros(HEADER - CENTRE)))
 
-    @cached_property
+    @cached
     def atlas(self) -> "CubeSphereAtlas | MongeAtlas":
         """Six charts over the sphere map, or Monge charts.
 

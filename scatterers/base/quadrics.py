@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.base.level_body import Body, finite, positive
+from scatterers.cached import cached
 from scatterers.kernels.compiled import Compiled, Kind
 from scatterers.kernels.trigonometry import cos_pi, cube_tangents, fill_frame, sin_pi
 from scatterers.pieces.regions import Regions
@@ -37,7 +38,7 @@ class BentEllipsoid(Body):
     def _shape(self) -> tuple[float, float, float, float]:
         raise NotImplementedError
 
-    @cached_property
+    @cached
     def bounds(self) -> FloatArray:
         """Box (2, 3) that contains the body, L."""
         a, b, c, d = self._shape()
@@ -128,7 +129,7 @@ class BentEllipsoid(Body):
         """Compiled psi^-1, normalised."""
         return self._compiled(_inverse, "inverse")
 
-    @cached_property
+    @cached
     def atlas(self) -> CubeSphereAtlas:
         """Six charts."""
         return CubeSphereAtlas(self, self._compiled(_locate, "locator"))

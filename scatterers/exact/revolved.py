@@ -47,6 +47,7 @@ from functools import cache
 from types import FunctionType
 from typing import Any, NamedTuple
 
+from scatterers.cached import cached
 from scatterers.kernels.compiled import OPTIONS
 from scatterers.kernels.revolved import value_and_gradient
 from scatterers.sphere_map.radial import RadialMap, Spine
@@ -155,7 +156,7 @@ class Revolved(PiecewiseBody):
         """Segments from the lower to the upper end of the axis."""
         raise NotImplementedError
 
-    @cached_property
+    @cached
     def pieces(self) -> Sequence[Piece]:
         """Smooth surfaces that bound the body, one after the other from below."""
         return [
@@ -170,7 +171,7 @@ class Revolved(PiecewiseBody):
         x, y, z = (float(self._axes[2] == k) for k in range(3))
         return x, y, z
 
-    @cached_property
+    @cached
     def bounds(self) -> FloatArray:
         """Box (2, 3) that contains the body, L."""
         return self._box(self._profile)
@@ -223,7 +224,7 @@ class Revolved(PiecewiseBody):
     def _compiled_numbers(self) -> Compiled:
         return Compiled(numbers, "level", self.compiled.parameters)
 
-    @cached_property
+    @cached
     def creases(self) -> Sequence[Crease]:
         """Circles along which pieces meet, and tips."""
         found = []
@@ -313,7 +314,7 @@ class Revolved(PiecewiseBody):
         n[..., iu], n[..., iv], n[..., iw] = local[..., 0], local[..., 1] * self._stretch, local[..., 2]
         return np.asarray(n / np.linalg.norm(n, axis=-1, keepdims=True))
 
-    @cached_property
+    @cached
     def atlas(self) -> "CubeSphereAtlas | NoCharts":
         """Six charts of a body that has neither edges nor tips and is seen whole from the middle of its box."""
         if any(crease.kind in SHARP for crease in self.creases) or self._axes != (0, 1, 2) or self._stretch != 1:

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
+from scatterers.cached import cached
 from scatterers.kernels.compiled import Compiled
 from scatterers.kernels.tensor import DEGREE, ITERATIONS, REACH, SMALL
 from scatterers.spline.tensor import evaluated
@@ -148,7 +149,7 @@ class RadialMap:
     spine: Spine
     iterative = True
 
-    @cached_property
+    @cached
     def box(self) -> FloatArray:
         """Box (2, 3) about the centre that contains the sheared grid, L."""
         ends = np.repeat(np.linspace(-REACH, REACH, 129)[:, None], 3, axis=1) * self.spine.half + self.spine.middle

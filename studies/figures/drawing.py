@@ -129,16 +129,16 @@ def panel(figure: Any, letter: str, text: str, place: tuple[float, float]) -> No
     figure.text(*place, rf"$\bf{{{letter}}}$  {text}", fontsize=9)
 
 
-def on_body(ax: Any, fan: cr.RayFan, curves: Sequence[cr.IsoPhaseCurve]) -> Drawing:
-    """Draw shadow line, rays and iso-phase curves on 3-D axes."""
-    drawing = compose(fan.line, fan, curves, rays=RAY_COUNT)
+def on_body(ax: Any, fan: cr.RayFan, curves: Sequence[cr.IsoPhaseCurve], until: float | None = np.inf) -> Drawing:
+    """Draw shadow line, rays and iso-phase curves on 3-D axes; ``until`` as of `creeping.plotting.picture`."""
+    drawing = compose(fan.line, fan, curves, rays=RAY_COUNT, until=until)
     axes3d.draw(ax, drawing)
     return drawing
 
 
-def in_parameters(ax: Any, fan: cr.RayFan, curves: Sequence[cr.IsoPhaseCurve]) -> None:
+def in_parameters(ax: Any, fan: cr.RayFan, curves: Sequence[cr.IsoPhaseCurve], until: float | None = np.inf) -> None:
     """Draw the same over the parameters, degrees, without legend."""
-    plot_parameters(fan.line, fan, curves, ax=ax, rays=RAY_COUNT, legend=False)
+    plot_parameters(fan.line, fan, curves, ax=ax, rays=RAY_COUNT, until=until, legend=False)
 
 
 def add_legend(figure: Any, drawings: Sequence[Drawing]) -> None:

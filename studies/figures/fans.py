@@ -7,7 +7,7 @@ import numpy as np
 
 import creeping as cr
 import scatterers as sc
-from creeping._typing import Any
+from creeping._typing import Any, FloatArray
 from creeping.plotting._drawing import Drawing
 from studies.figures.drawing import (
     add_legend,
@@ -25,6 +25,8 @@ TWISTED, TORUS = sc.TwistedEllipsoid(a=0.5, b=0.5, c=1.0, d=0.2), sc.Torus(R=1.0
 LENGTH, SPACING = 1.5, 0.25
 """Of rays, and between iso-phase curves."""
 LEVELS = equal_times(SPACING, LENGTH)[1:]
+EARLY = LEVELS[:-1]
+"""Levels that rays of the twisted ellipsoid meet before they have faded by 30 dB at k rho = 10."""
 DISTANCES = (1.05, 1.5, 3.0, 30.0)
 """Of sources from the centre of a sphere, in its radii."""
 HEIGHTS = (0.0, 0.7, 3.0)
@@ -38,7 +40,8 @@ def creeping(path: Path, quick: bool) -> dict[str, Any]:
 
     Rays start on the shadow line n.d = 0 with p = d, and are carried by the phase map; an iso-phase curve joins the
     points of equal travel time [YC06b]. (theta, phi) are the spherical angles of (x/a, (y - d cos(pi z))/b, z/c). Where
-    the body is not convex along a ray (kappa_n <= 0), the ray is detached: it goes on as a geodesic, drawn faint. A
+    the body is not convex along a ray (kappa_n <= 0), the ray is detached: it goes on as a geodesic, drawn faint. Rays
+    get paler every 10 dB (hard, k rho = 10) and end at 30 dB or their second caustic. A
     pole of the angles is the whole edge theta = 0 or 180 degrees: the shadow line of (1, 0, 0) passes through both.
     """
     from matplotlib.figure import Figure
@@ -52,13 +55,13 @@ def creeping(path: Path, quick: bool) -> dict[str, Any]:
     for row, (fan, d) in enumerate(zip(fans, incidences, strict=True)):
         bottom = 0.525 - 0.46 * row
         places = (0.0, bottom, 0.36, 0.41), (0.425, bottom + 0.075, 0.455, 0.32)
-        drawings.append(_pair(figure, fan, cr.iso_phase_curves(fan, LEVELS), *places))
+        drawings.append(_pair(figure, fan, cr.iso_phase_curves(fan, EARLY), *places, until=None))
         name = f"$d$ = ({', '.join(map(str, d))})"
         panel(figure, "ac"[row], f"{name}, on the body", (0.01, bottom + 0.425))
         panel(figure, "bd"[row], f"{name}, over the angles", (0.38, bottom + 0.425))
     first = [float(fan.detachment.min()) if np.isfinite(fan.detachment).any() else None for fan in fans]
     told = {"directions": incidences, "launched": "attached", "earliest_detachment": first}
-    return _finished(path, quick, figure, drawings, fans, flow, (0.905, 0.31, 0.016, 0.42), told)
+    return _finished(path, quick, figure, drawings, fans, flow, (0.905, 0.31, 0.016, 0.42), told, EARLY)
 
 
 def torus(path: Path, quick: bool) -> dict[str, Any]:
@@ -91,10 +94,17 @@ Place = tuple[float, float, float, float]
 """Of axes in a figure."""
 
 
-def _pair(figure: Any, fan: cr.RayFan, curves: Sequence[cr.IsoPhaseCurve], body: Place, angles: Place) -> Drawing:
+def _pair(
+    figure: Any,
+    fan: cr.RayFan,
+    curves: Sequence[cr.IsoPhaseCurve],
+    body: Place,
+    angles: Place,
+    until: float | None = np.inf,
+) -> Drawing:
     """Draw a fan on the body and over its angles."""
-    drawing = on_body(figure.add_axes(body, projection="3d"), fan, curves)
-    in_parameters(figure.add_axes(angles), fan, curves)
+    drawing = on_body(figure.add_axes(body, projection="3d"), fan, curves, until)
+    in_parameters(figure.add_axes(angles), fan, curves, until)
     return drawing
 
 
@@ -107,13 +117,14 @@ def _finished(
     flow: cr.PhaseMap,
     bar: Place,
     told: dict[str, Any],
+    levels: FloatArray = LEVELS,
 ) -> dict[str, Any]:
     """Add the keys of all panels, write the figure and return its card."""
     add_legend(figure, drawings)
     label = f"iso-phase curves: {drawings[0].colours.name} $t$"
-    add_level_bar(figure, drawings[0].colours, LEVELS, label, cax=figure.add_axes(bar))
+    add_level_bar(figure, drawings[0].colours, levels, label, cax=figure.add_axes(bar))
     figure.savefig(path, dpi=100 if quick else 300)
-    told |= {"rays": [len(fan.points) for fan in fans], "levels": LEVELS.tolist()}
+    told |= {"rays": [len(fan.points) for fan in fans], "levels": levels.tolist()}
     return rays_card(flow, fans_error(fans), LENGTH, **told)
 
 

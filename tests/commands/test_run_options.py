@@ -112,4 +112,4 @@ def test_pictures_have_titles_and_components(tmp_path, monkeypatch):
     assert drawn["wave"].startswith("500 MHz, k = ") and drawn["wave"].endswith("/m")
     words = drawn["far.png"][2]
     assert words["components"] == ("pt", "tt") and words["quantity"] == "rcs"
-    assert words["title"].startswith("ball\\$\n500 MHz, k = ") and words["title"].endswith(", pec")
+    assert words["title"].startswith("ball\\$, d = (1, 0, 0)\n500 MHz, k = ") and ", pec; error " in words["title"]

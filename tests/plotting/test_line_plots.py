@@ -47,7 +47,7 @@ def test_rays_in_the_plane_of_parameters(ball_fan):
     body = sc.Sphere()
     line = cr.shadow_line(body, (0.3, 0.5, 0.81), n_points=64)
     fan = cr.launch(cr.DirectFlow(body), line, length=1.0, n_rays=6, n_steps=8, max_gap=np.inf)
-    found = drawn(fan.plot(), "creeping ray")
+    found = drawn(fan.plot(until=np.inf), "creeping ray")
     expected = in_degrees(fan.points.reshape(-1, 3))
     assert farthest(expected, found) < 1e-6
     few = drawn(fan.plot(rays=2, until=0.5), "creeping ray")

@@ -10,7 +10,7 @@ import creeping as cr
 from creeping import CreepingError, InvalidInputError
 from creeping.plotting import parameter_picture, picture, pictures
 from creeping.plotting._drawing import View, shadow_view
-from creeping.plotting._strokes import chosen_rays, line_pieces, refined, runs, status_pieces, strokes
+from creeping.plotting._strokes import chosen_rays, drawn_ends, line_pieces, refined, runs, status_pieces, strokes
 from creeping.plotting.scene import GLProbe
 
 
@@ -82,7 +82,7 @@ def test_refined_ray_stays_on_the_great_circle(sphere_fan):
 
 
 def test_rays_stop_at_nan_and_fade_at_detachment(sphere_line, sphere_fan):
-    drawn = strokes(sphere_line, sphere_fan, (), rays=1000)
+    drawn = strokes(sphere_line, sphere_fan, (), rays=1000, ends=drawn_ends(sphere_fan, np.inf))
     by_label = {stroke.label: stroke.lines for stroke in drawn}
     assert len(by_label["creeping ray"]) == 30
     assert all(np.isfinite(points).all() for lines in by_label.values() for points in lines)

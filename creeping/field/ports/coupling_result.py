@@ -12,29 +12,17 @@ Sources: [PW81], [P82]; Derivations, F25, F28 and F34.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, overload
 
 import numpy as np
 
 from creeping._presenting import Drawn, brief
-from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
+from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
-from creeping.field.labelled import ArrayResult, power
-from creeping.field.point_result import FieldStatus
-from creeping.geometry.surface import Surface
-from creeping.storage.memory import required
-
-if TYPE_CHECKING:
-    import pandas
-    import xarray
-
-    from creeping.rays.port_rays import PortRays
-from typing import Literal
-
-from creeping._typing import ArrayLike
 from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import BoundaryLike, boundary_name, scalar_boundaries
-from creeping.field.point_result import Words
+from creeping.field.labelled import ArrayResult, power
+from creeping.field.point_result import FieldStatus, Words
 from creeping.field.ports.sources import PortSources, point_sources
 from creeping.field.ports.sums import PortSums, port_sums
 from creeping.field.special.airy import hard_modes
@@ -43,9 +31,14 @@ from creeping.geodesics.equations import points_of_charts
 from creeping.geometry.arguments import checked_body, positive_number
 from creeping.geometry.checks import unit_of
 from creeping.geometry.curvature import curvature_norms
-from creeping.geometry.surface import size
+from creeping.geometry.surface import Surface, size
 from creeping.rays.port_rays import PortRays, rays_between
 from creeping.rays.reach import AUTO
+from creeping.storage.memory import required
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 MEANINGS = {
     "point": "u of a unit source e^{ikr}/(4 pi r)",
@@ -164,6 +157,16 @@ class Coupling(ArrayResult, Drawn):
     axes: FloatArray | None
     _rays: PortRays
     _waves: ComplexArray
+
+    @overload
+    def __getitem__(self, index: tuple[int, int]) -> np.complex128: ...
+    @overload
+    def __getitem__(self, index: int | slice | tuple[int, slice] | tuple[slice, int | slice]) -> ComplexArray: ...
+    @overload
+    def __getitem__(self, index: Any) -> Any: ...
+    def __getitem__(self, index: Any) -> Any:
+        """One value of a pair (source, receiver), or part of the values."""
+        return self.values[index]
 
     @property
     def ok(self) -> BoolArray:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from scatterers.atlas.monge.charts import Field, FloatArray, MongeChart, MongeCharts
 from scatterers.atlas.monge.cover import VALID, Cover, covered_by, probes
+from scatterers.cached import cached
 from scatterers.kernels.compiled import Compiled
 from scatterers.kernels.monge import CHART, FIRST, LEAN, ORIGIN, OUTSIDE, PER_SIDE, SHAPE, VOXELS
 
@@ -93,7 +94,7 @@ class MongeAtlas:
         inside[some] = np.linalg.norm(back.points(uv[some]) - points[some], axis=-1) < 1e-6 * back.half
         return np.asarray(inside)
 
-    @cached_property
+    @cached
     def charts(self) -> Sequence[MongeChart]:
         """All charts."""
         return tuple(MongeChart(self.graphs[k]) for k in range(len(self.graphs.half)))
