@@ -63,7 +63,7 @@ def creeping_of(count):
 
 
 def bytes_of(folder):
-    """Bytes of all chunks of a store by path; attributes hold the seconds, which differ."""
+    """Bytes of all chunks of a store by path; those of attributes are of its counts too."""
     chunks = (p for p in sorted(folder.rglob("c/**/*")) if p.is_file() and p.suffix != ".partial")
     return {p.relative_to(folder).as_posix(): p.read_bytes() for p in chunks}
 

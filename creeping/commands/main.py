@@ -13,10 +13,12 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Group, Parameter, validators
 
+from creeping._progress import Progress
 from creeping._version import __version__
 from creeping.commands import check as _checking
 from creeping.commands import echo as _echo_command
 from creeping.commands import explore as _explore_command
+from creeping.commands import resuming
 from creeping.commands import sweep as _sweep_command
 from creeping.commands import upkeep as _upkeep
 from creeping.commands.body import AS_IT_IS, HELP, Body, FileOptions, SpeedOption, parse_body, table_formats, title_of
@@ -45,6 +47,7 @@ def main(arguments: list[str] | None = None) -> None:
     from creeping.errors import CreepingError
 
     given = sys.argv[1:] if arguments is None else arguments
+    resuming.words[:] = given
     if sorted(given) == ["--json", "--version"]:
         print(json.dumps(_upkeep.versions(), indent=1))
         raise SystemExit(0)
@@ -196,7 +199,7 @@ def run(
     of = of or ("travel_time" if source is None else "eikonal")
     incident = _run_results.asked_wave(direction, source)
     job = _field_run.job(wavenumber, boundary, observe, direction, **wave)
-    with _Progress(quiet=json_) as progress:
+    with Progress(quiet=json_) as progress:
         shape = parse_body(body, speed, options=file, cache=cache, progress=progress)
         planes = _plane_run.asked_planes(plane, job)
         if job:
@@ -325,7 +328,7 @@ def figure(
         near = near_names(name, studies.FIGURES) or f"; figures are {', '.join(studies.FIGURES)}"
         raise InvalidInputError(f"unknown figure {name!r}{near}")
     cards = []
-    with _Progress(quiet=json_) as progress:
+    with Progress(quiet=json_) as progress:
         for key in studies.FIGURES if name is None else [name]:
             progress(f"figure {key}")
             cards.append(studies.draw(key, output, quick=quick))
@@ -346,37 +349,3 @@ cache_app.command(_upkeep.list_maps, name="ls")
 cache_app.command(_upkeep.verify_maps, name="verify")
 cache_app.command(_upkeep.clear_maps, name="clear")
 app.command(_upkeep.doctor)
-
-
-class _Progress:
-    """What is being done, on standard error: a spinner on a terminal, plain lines elsewhere."""
-
-    def __init__(self, *, quiet: bool) -> None:
-        self.quiet = quiet
-        self._status: Any = None
-
-    def __enter__(self) -> "_Progress":
-        if not self.quiet and sys.stderr.isatty():
-            from rich.console import Console
-
-            self._status = Console(stderr=True).status("starting")
-            self._status.start()
-        return self
-
-    def note(self, text: str) -> None:
-        """Show what is to stay."""
-        if self._status is not None:
-            self._status.console.print(f"creeping: {text}", highlight=False, markup=False, soft_wrap=True)
-        elif not self.quiet:
-            print(f"creeping: {text}", file=sys.stderr, flush=True)
-
-    def __call__(self, text: str) -> None:
-        """Show what is being done now."""
-        if self._status is not None:
-            self._status.update(text)
-        elif not self.quiet:
-            print(f"creeping: {text} ...", file=sys.stderr, flush=True)
-
-    def __exit__(self, *_: object) -> None:
-        if self._status is not None:
-            self._status.stop()

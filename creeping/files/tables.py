@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
-from creeping._typing import Any, FloatArray
+from creeping._typing import Any, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.files import tables as _cut_table
 from creeping.files import tables as _far_table
@@ -342,8 +342,17 @@ def _spelled(suffix: str) -> str:
     return {"t": "theta", "p": "phi"}[suffix[1]]
 
 
-def write_echo(path: str | os.PathLike[str], echo: "Echo") -> None:
+def write_echo(path: str | os.PathLike[str], echo: "Echo", *, known: BoolArray | None = None, mark: str = "") -> None:
     """Write an echo as CSV.
+
+    Parameters
+    ----------
+    path : str or path
+    echo : Echo
+    known : (n, k) of bool, optional
+        Angles and wavenumbers whose rows are written.
+    mark : str
+        What the first line says of rows that are missing.
 
     Raises
     ------
@@ -363,10 +372,13 @@ def write_echo(path: str | os.PathLike[str], echo: "Echo") -> None:
     }
     hertz = echo.hertz
     with written_aside(path) as aside, open(aside, "w", encoding="utf-8", newline="\n") as stream:
+        stream.writelines([f"# {mark}\n"] if mark else [])
         stream.writelines(f"# {key}: {text}\n" for key, text in words.items() if text)
         stream.write(",".join(words) + "\n")
         for at in np.ndindex(total.shape):
             c, n, k = at
+            if known is not None and not known[n, k]:
+                continue
             row: list[Any] = [
                 echo.channels[c],
                 echo.azimuth[n],

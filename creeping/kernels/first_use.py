@@ -19,6 +19,7 @@ from pathlib import Path
 
 from numba.core import event as events
 
+from creeping._progress import compiling
 from creeping._typing import Any
 from creeping.kernels.threads import thread_count
 
@@ -41,6 +42,7 @@ class _FirstUse(events.Listener):  # type: ignore[misc]
 
     def on_start(self, event: Any) -> None:
         """Tell of the first kernel, start to compile ahead, and let the garbage wait."""
+        compiling(1)
         with self._lock:
             self._depth += 1
             if self._depth == 1:
@@ -60,6 +62,7 @@ class _FirstUse(events.Listener):  # type: ignore[misc]
 
     def on_end(self, event: Any) -> None:
         """Have the garbage collected as before."""
+        compiling(-1)
         with self._lock:
             self._depth -= 1
             if self._depth == 0:

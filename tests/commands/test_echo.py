@@ -8,7 +8,7 @@ import pytest
 import shared_bodies as sc
 from command_line import ran, table
 
-from creeping.commands.echo_report import echo_request
+from creeping.commands.echo_request import echo_request
 from creeping.commands.forecast import forecast
 from creeping.errors import InvalidInputError
 

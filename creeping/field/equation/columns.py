@@ -12,16 +12,19 @@ Sources: [SS86]; [E21]; Derivations, F35 and F36.
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from creeping._progress import say
 from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import Boundary
 from creeping.field.equation.matrix import Matrix, Places
 from creeping.field.equation.split_sums import CURL, ONE_LAYER, TWO_LAYERS, SmoothKernel, SplitSums, best_split
 from creeping.storage.memory import budget
+from creeping.storage.parts import Arrays, Keeping, not_kept
 
 TOGETHER = 2e8
 """Bytes of what GMRES keeps of right sides that are solved together."""
@@ -53,28 +56,39 @@ def is_dense(nodes: int, boundary: Boundary) -> bool:
 
 
 def solved_columns(
-    matrix: Matrix, right: ComplexArray, under: ComplexArray, tell: Callable[[str], None] = lambda words: None
+    matrix: Matrix,
+    right: ComplexArray,
+    under: ComplexArray,
+    tell: Callable[[str], None] = say,
+    keep: Keeping = not_kept,
 ) -> Columns:
     """Solve for right sides at the nodes (n, ...), and at the points beneath them (s, ...): of a conductor (n, 2, ...).
 
-    ``tell`` hears of each part of them that is begun.
+    ``tell`` hears of each part of them that is begun; ``keep`` has those that are done.
     """
     nodes, c = len(matrix.root), matrix.columns
     right = right.reshape(nodes, c, -1).astype(complex)
     right[matrix.at] -= 1j * under.reshape(len(matrix.at), *right.shape[1:])
     right = (right * matrix.root[:, None, None]).reshape(nodes * c, -1)
-    product = matrix.product if is_dense(nodes, matrix.boundary) else SplitProduct(matrix)
+    products: list[Callable[[ComplexArray], ComplexArray]] = []
     n, columns = right.shape
     many = max(1, min(columns, int(TOGETHER / (16 * n * (STEPS + 1)))))
     values, change, left = np.empty_like(right), np.empty_like(right), np.empty(columns)
     steps = 0
+
+    def solved(at: slice) -> Arrays:
+        if not products:
+            products.append(matrix.product if is_dense(nodes, matrix.boundary) else SplitProduct(matrix))
+        if at.start:
+            tell(f"right side {at.start} of {columns}")
+        found, rest, taken = block_gmres(products[0], right[:, at], TOLERANCE, STEPS)
+        return {"values": found, "change": right[:, at] - products[0](found), "left": rest, "steps": np.array([taken])}
+
     for first in range(0, columns, many):
-        if first:
-            tell(f"right side {first} of {columns}")
         at = slice(first, first + many)
-        values[:, at], left[at], taken = block_gmres(product, right[:, at], TOLERANCE, STEPS)
-        change[:, at] = right[:, at] - product(values[:, at])
-        steps = max(steps, taken)
+        part = keep(f"columns-{first}", partial(solved, at))
+        values[:, at], change[:, at], left[at] = part["values"], part["change"], part["left"]
+        steps = max(steps, int(part["steps"][0]))
     # fields at points make rows of their own
     matrix.__dict__.pop("whole", None)
     back = matrix.root[:, None, None]

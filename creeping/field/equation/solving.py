@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from creeping._progress import telling
 from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import checked, checked_plain
@@ -66,7 +67,7 @@ def solve(
     wavenumber: float,
     boundary: BoundaryLike,
     seconds: float = SECONDS,
-    progress: Callable[[str], None] | None = None,
+    progress: Callable[[str], None] | bool | None = None,
 ) -> Solution:
     """The field that a body scatters, by its integral equation: no shadow line and no rays are needed.
 
@@ -80,8 +81,8 @@ def solve(
     boundary : "soft", "hard", "pec" or ImpedanceBoundary
     seconds : float
         What it may take, about, with all cores; more is refused before it starts.
-    progress : callable, optional
-        Is told in words what is done, with the number of nodes, the time and the memory that it takes.
+    progress : callable or bool, optional
+        Is told in words what is done, with the number of nodes, the time and the memory that it takes; True shows it.
 
     Returns
     -------
@@ -107,7 +108,6 @@ def solve(
     kinds = scalar_boundaries(boundary)
     k = checked(wavenumber, 2, body)
     d = unit_directions(directions, "directions of incidence").reshape(-1, 3)
-    tell = progress or (lambda words: None)
     kind = CONDUCTOR if len(kinds) == 2 else kinds[0]
     tiles = body_tiles(body, k, kind)
     takes, memory = cost(len(tiles.points), kind, len(d))
@@ -119,8 +119,9 @@ def solve(
         )
     what = f"the integral equation between {len(tiles.points)} nodes for {len(d)} incidences"
     within_budget(memory, what, "lower the wavenumber or give fewer")
-    tell(f"{told}: integrals between the nodes")
-    return Solution(body, d, k, boundary, kind, tiles, tell)
+    with telling(progress) as tell:
+        tell(f"{told}: integrals between the nodes")
+        return Solution(body, d, k, boundary, kind, tiles, tell)
 
 
 def cost(nodes: int, boundary: Boundary, incidences: int) -> tuple[float, float]:

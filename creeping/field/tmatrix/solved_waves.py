@@ -10,6 +10,7 @@ Sources: [W71]; [MTL02, sec. 5.8]; Derivations, F36.
 """
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from creeping.field.equation.columns import solved_columns
 from creeping.field.equation.matrix import BLOCK, Matrix, Places
 from creeping.field.tmatrix.mirrors import Mirrors, parities
 from creeping.field.tmatrix.spherical_waves import combined, count, gradients, regular, vector_parts
+from creeping.storage.parts import Arrays, Keeping, not_kept
 
 COLUMNS = 512
 """Right sides that are solved together: between them an interrupt is heard."""
@@ -56,8 +58,9 @@ class SolvedWaves:
         tell: Callable[[str], None],
         *,
         direct: bool,
+        keep: Keeping = not_kept,
     ) -> None:
-        self._of, self._center, self._order, self._mirrors = matrix, center, order, mirrors
+        self._of, self._center, self._order, self._mirrors, self._keep = matrix, center, order, mirrors, keep
         self._sums, which = parities(order, self._mirrors.axes, vector=matrix.vector)
         c, part, signs, images = matrix.columns, self._mirrors.part, self._mirrors.signs, self._mirrors.images
         under = np.full(len(matrix.root), -1)
@@ -111,16 +114,27 @@ class SolvedWaves:
         B = given[0] * root
         above = (c * self._above[:, None] + np.arange(c)).ravel()
         B[above] -= 1j * given[1] * root[above]
-        blocks = self._blocks()
+        blocks: list[np.ndarray] = []
+        factors: dict[int, Any] = {}
+
+        def solved(number: int, first: int, right: np.ndarray) -> Arrays:
+            if not blocks:
+                tell("integrals between the nodes")
+                blocks.extend(self._blocks())
+            if number not in factors:
+                factors.clear()
+                tell(f"factors of block {number + 1} of {len(parts)}")
+                # rows of C are columns of Fortran
+                factors[number] = lu_factor(blocks[number].T, overwrite_a=True, check_finite=False)
+            tell(f"block {number + 1} of {len(parts)}, wave {first + 1} of {len(parts[number])}")
+            return {"values": lu_solve(factors[number], right, trans=1, check_finite=False)}
+
         for number, at in enumerate(parts):
-            tell(f"factors of block {number + 1} of {len(parts)}")
-            # rows of C are columns of Fortran
-            factors = lu_factor(blocks[number].T, overwrite_a=True, check_finite=False)
             found = np.asfortranarray(B[:, at])
             for first in range(0, len(at), COLUMNS):
-                tell(f"wave {first + 1} of {len(at)}")
                 some = slice(first, first + COLUMNS)
-                found[:, some] = lu_solve(factors, found[:, some], trans=1, check_finite=False)
+                made = partial(solved, number, first, found[:, some])
+                found[:, some] = self._keep(f"block-{number}-{first}", made)["values"]
             yield found / root
 
     def _blocks(self) -> np.ndarray:
@@ -165,7 +179,7 @@ class SolvedWaves:
         """Values at all nodes (c n, waves) by GMRES."""
         matrix, c = self._of, self._of.columns
         right, under = (part.reshape(-1, c, part.shape[1]) for part in given)
-        found = solved_columns(matrix, right, under, tell)
+        found = solved_columns(matrix, right, under, tell, self._keep)
         yield found.values.reshape(c * len(right), -1).astype(np.complex64)
 
     def extinction(self, points: FloatArray) -> float:
