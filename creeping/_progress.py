@@ -137,6 +137,7 @@ class Progress:
             return f"{self._stage or 'starting'}, {now - self._since:.0f} s" + f": {doing}" * bool(doing)
         rest = max(self.left() - (now - told), 0.0)
         left = f", {rest:.0f} s left" if self.left() else f", {now - self._since:.0f} s so far" * (done < total)
+        doing = doing if done < total else ""
         return f"{int(done)} of {total}{f' {self.what}' if self.what else ''}{left}" + f": {doing}" * bool(doing)
 
     def _tick(self) -> None:

@@ -21,7 +21,9 @@ from creeping.field.arguments import checked, checked_across, checked_method, ch
 from creeping.field.body_currents import expected_seconds
 from creeping.field.boundary import BoundaryLike
 from creeping.field.echo import Echo
+from creeping.field.equation.solving import is_rough
 from creeping.field.tmatrix.computing import pays
+from creeping.field.validity_range import is_reached
 from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geometry.arguments import checked_body, folder_path, real_array, real_number, shown, whole_number
 from creeping.geometry.directions import azimuth_elevation_of, directions_from_azimuth_elevation
@@ -73,7 +75,7 @@ def backscatter(
     method : {"auto", "rays", "currents", "equation", "t-matrix"}
         As of `creeping.sweep_directions`: "auto" takes currents where rays leave a value unresolved and err more, and
         the integral equation of a body with edges, joints or tips, or its T-matrix where that is quicker for so many
-        angles.
+        angles: there, and where parts are more curved than rays allow.
     n_rays : int
         Rays of an incidence.
     cache : bool
@@ -198,6 +200,8 @@ def monostatic_method(body: Surface, wavenumbers: FloatArray, boundary: Boundary
     ``wavenumbers`` (k,), 1/L.
     """
     solved = why_no_rays(body) or is_piecewise(body)
+    if not solved and not is_rough(body):
+        solved = not is_reached(body, float(np.min(wavenumbers)))
     return "t-matrix" if solved and all(pays(body, k, boundary, incidences) for k in wavenumbers) else "auto"
 
 

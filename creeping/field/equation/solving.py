@@ -155,7 +155,7 @@ class Solved(NamedTuple):
 
 def solution_for(body: Surface, direction: FloatArray, wavenumber: float, boundary: BoundaryLike) -> Solved | None:
     """The solution of an incidence, if the equation of the body costs less than SECONDS and resolves it, else None."""
-    if _is_rough(body):
+    if is_rough(body):
         return None
     found = _found(body, direction, wavenumber, boundary)
     if found is None and not too_much(body, wavenumber, boundary, SECONDS):
@@ -247,7 +247,7 @@ def _kind(boundary: BoundaryLike) -> Boundary:
     return CONDUCTOR if len(kinds) == 2 else kinds[0]
 
 
-def _is_rough(body: Surface) -> bool:
+def is_rough(body: Surface) -> bool:
     """Whether a body says of itself that it is somewhere not smooth enough for rays: what it is there is not known."""
     rough = getattr(body, "non_smooth", None)
     if rough is None or is_piecewise(body):

@@ -38,6 +38,7 @@ from creeping.field.tmatrix.solved_waves import SolvedWaves
 from creeping.field.tmatrix.spherical_waves import count, vector_count
 from creeping.geometry.arguments import folder_path, real_array, shown, whole_number
 from creeping.geometry.checks import unit_of
+from creeping.geometry.memo import memo
 from creeping.geometry.surface import Surface, fingerprint
 from creeping.kernels.threads import thread_count
 from creeping.storage.memory import budget, within_budget
@@ -228,7 +229,16 @@ def expected(body: Surface, wavenumber: float, boundary: BoundaryLike) -> Plan:
     kind = CONDUCTOR if len(kinds) == 2 else kinds[0]
     radius = 0.5 * float(np.linalg.norm(np.ptp(np.asarray(body.bounds, dtype=float), axis=0)))
     nodes = plan_of(body, wavenumber, boundary).nodes
-    return plan_for(int(FINER**2 * nodes), kind, order_for(wavenumber * radius))
+
+    def parts() -> int:
+        matrix = Matrix(body_tiles(body, FINER * wavenumber, kind), wavenumber, kind)
+        return len(mirrors_of(matrix, _center(body, None)).images)
+
+    # as many at every wavenumber
+    images = (
+        1 if kind.varies else memo(body, f"images of a {'vector' if kind.kind == 'conductor' else 'scalar'}", parts)
+    )
+    return plan_for(int(FINER**2 * nodes), kind, order_for(wavenumber * radius), images)
 
 
 def pays(body: Surface, wavenumber: float, boundary: BoundaryLike, incidences: int) -> bool:
