@@ -17,7 +17,6 @@ BAR = 30
 """Characters of a notebook's bar."""
 
 _words = ""
-_compiling = 0
 
 
 def say(words: str) -> None:
@@ -26,14 +25,10 @@ def say(words: str) -> None:
     _words = words
 
 
-def compiling(more: int) -> None:
-    """Count kernels that are being compiled: 1 when one is begun, -1 when it is done."""
-    global _compiling
-    _compiling += more
-
-
 def _now() -> str:
-    return "compiling kernels, once for this installation" if _compiling > 0 else _words
+    # it stands above
+    kernels: Any = sys.modules.get("creeping.kernels.first_use")
+    return "compiling kernels, once for this installation" if kernels and kernels.is_compiling() else _words
 
 
 class Progress:

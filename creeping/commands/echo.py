@@ -163,10 +163,6 @@ def _echo(
     reference = echo_report.reference_of(request, *measured)
     with Progress(quiet=as_json) as progress:
         shape = parse_body(body, progress=progress, **made)
-        unfinished = resuming.begun(output, quantity, resuming.asked_for(body, shape, **options), resume=resume)
-        if unfinished is None:
-            print((output / resuming.SUMMARY).read_text() if as_json else f"nothing is missing in {output}")
-            return 0
         azimuths, elevations = request.angles(shape)
         if method == "auto" and request.monostatic:
             method = monostatic_method(shape, request.wavenumbers, boundary, len(azimuths))
@@ -181,6 +177,10 @@ def _echo(
             cure=request.cure,
         )
         progress.note(f"{told.body}, {boundary_words(boundary)}")
+        unfinished = resuming.begun(output, quantity, resuming.asked_for(body, shape, **options), resume=resume)
+        if unfinished is None:
+            print((output / resuming.SUMMARY).read_text() if as_json else f"nothing is missing in {output}")
+            return 0
         values = len(azimuths) * len(request.wavenumbers)
         progress(f"{echo_report.asked_words(azimuths, request)} by {told.by}")
         progress.begin(0, values)

@@ -176,8 +176,12 @@ def run(
     ] = "auto",
     formats: Annotated[str, Parameter(name="--format", group=_output, help=HELP)] = "csv",
     json_: Json = False,
+    resume: _echo_command.Resume = False,
 ) -> int:
     """Shadow line, creeping rays, iso-phase curves, pictures and files for one incidence."""
+    options = {name: value for name, value in locals().items() if name not in ("body", "file", "output", "json_")}
+    options |= file.given()
+    del options["resume"]
     import numpy as np
 
     import creeping as cr
@@ -208,9 +212,13 @@ def run(
             kind = _forecast.boundary_words(job.boundary)
             progress.note(f"{kind}{'' if boundary else ', as no --boundary is given'}: far field by {told.by}")
             job = job.fitted(shape)
+        unfinished = resuming.begun(output, "run", resuming.asked_for(body, shape, **options), resume=resume)
+        if unfinished is None:
+            print((output / resuming.SUMMARY).read_text() if json_ else f"nothing is missing in {output}")
+            return 0
         if why_no_rays(shape):
             result = _run_solved.run_solved(
-                shape, job, incident, output, body, planes, tables, pictures, backend, progress
+                shape, job, incident, output, body, planes, tables, pictures, backend, progress, unfinished
             )
             print(json.dumps(result, indent=1) if json_ else _run_solved.readable(result, output))
             return 0
@@ -224,27 +232,27 @@ def run(
         step = spacing or fan.length / 16
         curves = cr.iso_phase_curves(fan, levels_of(fan, step, of), of=of)
         summary = _run_results.summary_of(body, speed, line, carrier, fan, curves)
-        if job:
-            progress("field")
-            far, field_seconds = job.far_field(fan)
-        progress("pictures and files" if pictures else "files")
-        drawn_with = backend if pictures else None
-        summary["files"], summary["drawn_by"] = _run_results.write_results(
-            output, line, fan, curves, drawn_with, tables
-        )
-        written: dict[str, Any] = {"pictures": pictures, "formats": tables}
-        if job:
-            summary["field"], names = job.write(far, fan, output, backend, title_of(body), **written)
-            summary["field"]["seconds"] = field_seconds
-            summary["files"][-1:-1] = names
-        if job and planes:
-            asked = planes, job, fan, output, title_of(body), progress
-            summary["planes"], names = _plane_run.write_planes(*asked, **written)
-            summary["files"][-1:-1] = names
-        summary["seconds"] = round(time.perf_counter() - started, 2)
-        from creeping.files import write_text
-
-        write_text(output / "summary.json", json.dumps(summary, indent=1) + "\n")
+        with resuming.kept(unfinished, progress.message):
+            if job:
+                progress("field")
+                far, field_seconds = job.far_field(fan, unfinished, progress.told)
+            progress("pictures and files" if pictures else "files")
+            drawn_with = backend if pictures else None
+            summary["files"], summary["drawn_by"] = _run_results.write_results(
+                output, line, fan, curves, drawn_with, tables
+            )
+            written: dict[str, Any] = {"pictures": pictures, "formats": tables}
+            if job:
+                summary["field"], names = job.write(far, fan, output, backend, title_of(body), **written)
+                summary["field"]["seconds"] = field_seconds
+                summary["files"][-1:-1] = names
+            if job and planes:
+                asked = planes, job, fan, output, title_of(body), progress
+                summary["planes"], names = _plane_run.write_planes(*asked, **written)
+                summary["files"][-1:-1] = names
+            summary["seconds"] = round(time.perf_counter() - started, 2)
+            unfinished.write_summary(summary, complete=True)
+            unfinished.finished()
     print(json.dumps(summary, indent=1) if json_ else _run_results.readable(summary, output))
     return 0
 

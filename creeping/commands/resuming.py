@@ -9,14 +9,19 @@ import shlex
 import shutil
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from creeping._progress import EVERY
 from creeping._version import __version__
 from creeping.errors import CreepingError, InvalidInputError
+
+if TYPE_CHECKING:
+    from creeping.storage.parts import Parts
 
 ASKED, SUMMARY = "asked.json", "summary.json"
 MOST = 10_000_000
@@ -50,6 +55,7 @@ class Unfinished:
     output: Path
     parts: Path
     asked: dict[str, Any]
+    _shown: float = field(default_factory=time.monotonic)
 
     @property
     def again(self) -> str:
@@ -61,11 +67,33 @@ class Unfinished:
         """What files say that lack rows."""
         return f"to go on: {self.again}"
 
-    def write_summary(self, summary: dict[str, Any], *, complete: bool) -> None:
-        """Write the summary file."""
+    def make(self) -> None:
+        """Make the folder of the parts."""
         from creeping.files import write_text
 
-        text = json.dumps({"complete": complete, **summary, "asked": self.asked}, indent=1)
+        try:
+            self.parts.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InvalidInputError(f"cannot make the folder {self.output}: {error}; choose another with -o") from error
+        write_text(self.parts / ASKED, json.dumps(self.asked, indent=1) + "\n")
+
+    def kept_parts(self) -> "Parts":
+        """What keeps arrays by name; see `creeping.storage.parts`."""
+        from creeping.storage.parts import Parts
+
+        return Parts(self.parts, self.asked)
+
+    def now_and_then(self, write: Callable[[], None]) -> None:
+        """Have what is there written, unless that was done a moment ago."""
+        if time.monotonic() - self._shown >= EVERY:
+            write()
+            self._shown = time.monotonic()
+
+    def write_summary(self, summary: dict[str, Any], *, complete: bool) -> None:
+        """Write the summary file, without the seconds, which are those of one run."""
+        from creeping.files import write_text
+
+        text = json.dumps({"complete": complete, **_timeless(summary), "asked": self.asked}, indent=1)
         write_text(self.output / SUMMARY, text + "\n")
 
     def finished(self) -> None:
@@ -73,17 +101,21 @@ class Unfinished:
         shutil.rmtree(self.parts, ignore_errors=True)
 
 
+def _timeless(value: Any) -> Any:
+    """A summary without its seconds."""
+    if isinstance(value, dict):
+        return {name: _timeless(one) for name, one in value.items() if name != "seconds"}
+    return [_timeless(one) for one in value] if isinstance(value, list) else value
+
+
 def begun(output: Path, name: str, asked: dict[str, Any], *, resume: bool) -> Unfinished | None:
-    """Parts of results in a folder, made or found; None if all was done before.
+    """Parts of results in a folder, found or to be made by `kept`; None if all was done before.
 
     Raises
     ------
     InvalidInputError
         If something else was asked for before, or rows are there and ``resume`` is false.
-    CreepingError
-        If nothing can be written there.
     """
-    from creeping.files import write_text
     from creeping.sweeping.plan import differing
 
     found = Unfinished(output, output / f"{name}.parts", asked)
@@ -103,11 +135,6 @@ def begun(output: Path, name: str, asked: dict[str, Any], *, resume: bool) -> Un
         )
     else:
         shutil.rmtree(found.parts, ignore_errors=True)
-    try:
-        found.parts.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InvalidInputError(f"cannot make the folder {output}: {error}; choose another with -o") from error
-    write_text(found.parts / ASKED, json.dumps(asked, indent=1) + "\n")
     return found
 
 
@@ -122,11 +149,12 @@ def _read(path: Path) -> dict[str, Any] | None:
 
 @contextmanager
 def kept(unfinished: Unfinished, message: Callable[[str], None]) -> Iterator[None]:
-    """Take SIGTERM for an interrupt, and say how to go on where something ends what is done within."""
+    """Make the folder of the parts, take SIGTERM for an interrupt, and say how to go on where something ends what is done within."""
 
     def stop(*_: Any) -> None:
         raise KeyboardInterrupt
 
+    unfinished.make()
     main = threading.current_thread() is threading.main_thread()
     before = signal.signal(signal.SIGTERM, stop) if main else None
     try:

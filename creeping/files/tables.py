@@ -147,6 +147,7 @@ def write_csv(
     far: "FarField | None" = None,
     cut: "FieldCut | None" = None,
     observed: tuple[Sequence[str], FloatArray] | None = None,
+    mark: str = "",
 ) -> None:
     """Write one table as CSV, one row per point or direction, its columns explained in lines that begin with ``#``.
 
@@ -158,6 +159,8 @@ def write_csv(
         Exactly one of them: they have different columns.
     observed : (texts, angles), optional
         Of a far field: what each direction was asked for as, and its angle along the cut (m,), degrees.
+    mark : str
+        What the first line says of rows that are missing.
 
     Raises
     ------
@@ -173,6 +176,7 @@ def write_csv(
             f"write_csv got {' and '.join(given) or 'nothing'}; give exactly one of {', '.join(parts)}, a file for each"
         )
     with written_aside(path) as aside, aside.open("w", encoding="ascii", newline="\n") as stream:
+        stream.writelines([f"# {mark}\n"] if mark else [])
         if line is not None:
             _write_table(stream, _in_unit(_LINE_NOTES, unit_of(line.body)), _line_rows(line))
         elif fan is not None:

@@ -10,7 +10,8 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping import _progress
-from creeping._progress import Progress, compiling, reporting, say, telling
+from creeping._progress import Progress, reporting, say, telling
+from creeping.kernels import first_use
 
 
 @pytest.fixture
@@ -18,13 +19,13 @@ def hasty(monkeypatch):
     monkeypatch.setattr(_progress, "EVERY", 0.6)
 
 
-def test_lines_come_by_themselves(hasty, capsys):
+def test_lines_come_by_themselves(hasty, monkeypatch, capsys):
     with Progress("values") as progress:
         progress("a fit of the mesh")
         time.sleep(0.8)
-        compiling(1)
-        time.sleep(0.7)
-        compiling(-1)
+        with monkeypatch.context() as patch:
+            patch.setattr(first_use, "is_compiling", lambda: True)
+            time.sleep(0.7)
         progress.begin(0, 10)
         progress.told(2, 10)
         time.sleep(0.1)

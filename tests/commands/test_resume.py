@@ -10,6 +10,8 @@ from command_line import creeping, ran, table
 from ended import ending_after, killed, stamps
 
 from creeping.commands import resuming
+from creeping.field import far
+from creeping.storage.parts import Parts
 from creeping.sweeping import blocks
 
 TS = ["ts", "sphere:radius=0.1", "--sound-speed", 1500, "--frequency", "3:4:1kHz", "--monostatic", "az:0:4:1"]
@@ -109,3 +111,36 @@ def test_killed_20_times_it_comes_to_the_same_bytes(tmp_path, words):
             assert done or before.items() <= stamps(out, "*.parts/*/task_status/c/*").items()
         assert ran(*words, "-o", out, "--resume") == 0
         assert files(out) == expected
+
+
+@pytest.mark.parametrize("by", ["rays", "currents"])
+def test_a_grid_of_directions_goes_on(tmp_path, monkeypatch, capsys, by):
+    words = ["run", "sphere", "--direction", 1, 0, 0, "--wavenumber", 30, "--observe", "grid:30", "--no-pictures"]
+    words += ["--rays", 32, "--no-cache"]
+    if by == "rays":
+        monkeypatch.setattr(far, "affordable", lambda *_, **__: False)
+        monkeypatch.setattr(far, "measured_level", lambda *_: None)
+    monkeypatch.setattr(far, "TOGETHER", 40)
+    assert ran(*words, "-o", tmp_path / "whole") == 0
+    made, real = [], Parts.__call__
+
+    def ended(parts, name, make):
+        if len(made) == 2:
+            signal.raise_signal(signal.SIGTERM)
+        return real(parts, name, lambda: made.append(name) or make())
+
+    monkeypatch.setattr(Parts, "__call__", ended)
+    out = tmp_path / "out"
+    code, _, err = creeping(*words, "-o", out, capsys=capsys)
+    assert code == 130 and "to go on: creeping run sphere --direction 1 0 0" in err
+    if by == "rays":
+        summary = json.loads((out / "summary.json").read_text())
+        assert summary["complete"] is False and (summary["directions_done"], summary["directions"]) == (80, 91)
+        assert (out / "far.csv").read_text().startswith("# incomplete: 80 of 91 directions; to go on: creeping run")
+        assert len(table(out / "far.csv")) == 80
+    code, _, err = creeping(*words[:-1], "-o", out, "--resume", capsys=capsys)
+    assert code == 3 and "--cache (stored False, now True)" in err
+    first, made[2:] = made[:2], [""]
+    assert ran(*words, "-o", out, "--resume") == 0
+    assert not set(first) & set(made[3:]) and len(made) > 3
+    assert files(out) == files(tmp_path / "whole")

@@ -32,6 +32,7 @@ from creeping.geometry.checks import unit_of
 from creeping.geometry.parts import inside as inside_of
 from creeping.geometry.surface import Surface, size
 from creeping.shadow.attachment import is_lit
+from creeping.storage.parts import Keeping, not_kept
 
 TOUCHING = 1e-6
 """Distance from the body, in its sizes, up to which a point is on it."""
@@ -72,6 +73,7 @@ class Solution:
         kind: Boundary,
         tiles: Tiles,
         tell: Callable[[str], None],
+        keep: Keeping = not_kept,
     ) -> None:
         self.body, self.directions, self.wavenumber, self.boundary = body, directions, wavenumber, boundary
         self._kind, self._matrix = kind, Matrix(tiles, wavenumber, kind)
@@ -81,7 +83,7 @@ class Solution:
         right, under = (
             twice_incident(kind, places, directions, wavenumber, magnetic) for places in (matrix.nodes, matrix.inner)
         )
-        found = solved_columns(matrix, right, under, tell)
+        found = solved_columns(matrix, right, under, tell, keep)
         self.steps, self.left = found.steps, found.left
         both = np.stack([found.values, found.change])
         if matrix.vector:

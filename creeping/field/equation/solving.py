@@ -38,6 +38,7 @@ from creeping.geometry.quadrature import node_count
 from creeping.geometry.surface import Surface
 from creeping.kernels.threads import thread_count
 from creeping.storage.memory import budget, within_budget
+from creeping.storage.parts import Keeping, not_kept
 
 PRODUCTS = 25
 """Products with the matrix, about, that an incidence takes."""
@@ -104,6 +105,19 @@ def solve(
     >>> far.method.tolist(), bool(far.error.max() < 0.01 * abs(far.total).max())
     (['equation', 'equation'], True)
     """
+    return kept_solution(body, directions, wavenumber, boundary, seconds, progress, not_kept)
+
+
+def kept_solution(
+    body: Surface,
+    directions: ArrayLike,
+    wavenumber: float,
+    boundary: BoundaryLike,
+    seconds: float,
+    progress: Callable[[str], None] | bool | None,
+    keep: Keeping,
+) -> Solution:
+    """The same, its columns given to ``keep`` as they are solved."""
     checked_plain(body)
     kinds = scalar_boundaries(boundary)
     k = checked(wavenumber, 2, body)
@@ -121,7 +135,7 @@ def solve(
     within_budget(memory, what, "lower the wavenumber or give fewer")
     with telling(progress) as tell:
         tell(f"{told}: integrals between the nodes")
-        return Solution(body, d, k, boundary, kind, tiles, tell)
+        return Solution(body, d, k, boundary, kind, tiles, tell, keep)
 
 
 def cost(nodes: int, boundary: Boundary, incidences: int) -> tuple[float, float]:
