@@ -149,7 +149,7 @@ def _read(path: Path) -> dict[str, Any] | None:
 
 @contextmanager
 def kept(unfinished: Unfinished, message: Callable[[str], None]) -> Iterator[None]:
-    """Make the folder of the parts, take SIGTERM for an interrupt, and say how to go on where something ends the work."""
+    """Make the folder of the parts, take SIGTERM for an interrupt, and say how to go on where the work is ended."""
 
     def stop(*_: Any) -> None:
         raise KeyboardInterrupt

@@ -75,11 +75,14 @@ class SolvedWaves:
         self._values: Any = np.empty((c * len(matrix.root), len(size)), dtype=np.complex64)
         rows = (c * images[:, :, None] + np.arange(c)).reshape(len(images), -1)
         parts = [np.flatnonzero(which == number) for number in range(len(images))]
+        # columns of values stand by parity
+        self._columns, first = np.concatenate(parts), 0
         for number, found in enumerate(self._factorised(given, parts, tell) if direct else self._iterated(given, tell)):
             at, chi = parts[number], self._mirrors.characters[number]
             T[np.ix_(at, at)] = len(chi) * size[at][:, None] * (sent[:, at].T @ found) * self._size[at]
             for image, sign in zip(rows, chi[:, None] * signs.reshape(len(chi), -1), strict=True):
-                self._values[np.ix_(image, at)] = found * sign[:, None].astype(np.float32)
+                self._values[image, first : first + len(at)] = found * sign[:, None].astype(np.float32)
+            first += len(at)
         self.T: ComplexArray = np.asarray(self._sums @ (self._sums @ T.T).T)
 
     def _waves_at(self, places: Places) -> WavesAt:
@@ -191,8 +194,12 @@ class SolvedWaves:
         x, z = (np.broadcast_to(row, points.shape) for row in np.eye(3)[[0, 2]])
         if not matrix.vector:
             kind, factor = ("single", -0.5) if matrix.soft else ("double", 0.5)
-            left = factor * matrix.received(Places.at(points, z), np.asarray(self._values), kind) * self._size
-            left += (self._sums.T @ table[:, : count(self._order)].T).T
+            left = (
+                factor
+                * matrix.received(Places.at(points, z), np.asarray(self._values), kind)
+                * self._size[self._columns]
+            )
+            left += (self._sums.T @ table[:, : count(self._order)].T).T[:, self._columns]
             return float(np.sqrt(4 * np.pi * np.sum(np.abs(left) ** 2) / len(points)))
         # (n x H) x n has no part along n: another n for that one
         H = np.empty((len(points), 3, self._values.shape[1]), dtype=complex)
@@ -202,9 +209,9 @@ class SolvedWaves:
             found = 0.5 * matrix.received(places, both)
             turned = places.a[:, :, None] * found[:, :1] + places.b[:, :, None] * found[:, 1:]
             H[:, axes] = np.cross(turned, normals[:, :, None], axis=1)[:, axes]
-        H *= self._size
+        H *= self._size[self._columns]
         E = np.stack([(part.T @ table.T).T for part in (p @ self._sums for p in vector_parts(self._order))], axis=1)
-        H += -1j * E.reshape(len(points), 3, -1, 2)[..., ::-1].reshape(E.shape)
+        H += -1j * E.reshape(len(points), 3, -1, 2)[..., ::-1].reshape(E.shape)[..., self._columns]
         return float(np.sqrt(2 * np.pi * np.sum(np.abs(H) ** 2) / len(points)))
 
 
