@@ -63,9 +63,9 @@ def creeping_of(count):
 
 
 def bytes_of(folder):
-    """Bytes of all chunks of a store by path; attributes hold the seconds, which differ."""
-    chunks = (p for p in sorted(folder.rglob("c/**/*")) if p.is_file() and p.suffix != ".partial")
-    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in chunks}
+    """Bytes of all files of a store by path, but its lock."""
+    files = (p for p in sorted(folder.rglob("*")) if p.is_file() and p.suffix != ".partial" and p.name != ".lock")
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in files}
 
 
 def drive(folder, count, chunk, workers):

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 
 from cyclopts import Group, Parameter
 
+from creeping._progress import Progress
 from creeping.commands.body import AS_IT_IS, HELP, Body, FileOptions, parse_body, table_formats
 
 _angles = Group("Angles")
@@ -55,6 +56,10 @@ Folder = Annotated[Path | None, Parameter(name=["-o", "--output"], group=_output
 Pictures = Annotated[bool, Parameter(group=_output, help="Draw pictures; --no-pictures leaves them out.")]
 Formats = Annotated[str, Parameter(name="--format", group=_output, help=HELP)]
 Json = Annotated[bool, Parameter(name="--json", negative="", group=_output, help="Print the summary as JSON.")]
+Resume = Annotated[
+    bool,
+    Parameter(negative="", help="Go on with what a run that was ended has left in the folder of the results."),
+]
 Cache = Annotated[bool, Parameter(help="Keep the phase map for the next run.")]
 
 
@@ -79,6 +84,7 @@ def rcs(
     pictures: Pictures = True,
     formats: Formats = "csv",
     json_: Json = False,
+    resume: Resume = False,
 ) -> int:
     """Radar cross section of a perfect conductor in dBsm: over angle, over frequency, or both."""
     asked: dict[str, Any] = {"frequency": frequency, "wavelength": wavelength, "sound_speed": None}
@@ -87,7 +93,7 @@ def rcs(
     made: dict[str, Any] = {"options": file, "cache": cache}
     written: dict[str, Any] = {"pictures": pictures, "formats": formats}
     measured = (compare, column, align)
-    return _echo("rcs", body, asked, made, method, measured, output or Path("rcs"), written, as_json=json_)
+    return _echo("rcs", body, asked, made, method, measured, output or Path("rcs"), written, json_, resume)
 
 
 def ts(
@@ -110,6 +116,7 @@ def ts(
     pictures: Pictures = True,
     formats: Formats = "csv",
     json_: Json = False,
+    resume: Resume = False,
 ) -> int:
     """Target strength of a body in dB re 1 m: over angle, over frequency, or both."""
     from creeping.errors import InvalidInputError
@@ -122,7 +129,7 @@ def ts(
     made: dict[str, Any] = {"options": file, "cache": cache}
     written: dict[str, Any] = {"pictures": pictures, "formats": formats}
     measured = (compare, column, align)
-    return _echo("ts", body, asked, made, method, measured, output or Path("ts"), written, as_json=json_)
+    return _echo("ts", body, asked, made, method, measured, output or Path("ts"), written, json_, resume)
 
 
 def _echo(
@@ -134,85 +141,68 @@ def _echo(
     measured: tuple[Path | None, str | None, float],
     output: Path,
     written: dict[str, Any],
-    *,
     as_json: bool,
+    resume: bool,
 ) -> int:
-    from creeping.commands import echo_report
-    from creeping.commands.echo_report import echo_request
+    from creeping.commands import echo_report, resuming
+    from creeping.commands.echo_request import echo_request, radians_hint
     from creeping.commands.forecast import boundary_words, forecast
     from creeping.field.boundary import parse_boundary
-    from creeping.sweeping.echoes import echo_of, monostatic_method
+    from creeping.sweeping.echoes import monostatic_method
 
     started = time.perf_counter()
     request = echo_request(quantity, **asked)
     for name in ("monostatic", "bistatic", "incidence"):
-        if hint := echo_report.radians_hint(f"--{name}", asked[name]):
+        if hint := radians_hint(f"--{name}", asked[name]):
             print(f"creeping: {hint}", file=sys.stderr)
     boundary = parse_boundary(request.boundary)
+    options = {**asked, "method": method, **made["options"].given(), **written}
+    options |= dict(zip(("compare", "column", "align"), measured, strict=True))
     written["formats"] = table_formats(written["formats"])
     # before the time is spent
     reference = echo_report.reference_of(request, *measured)
+    with Progress(quiet=as_json) as progress:
+        shape = parse_body(body, progress=progress, **made)
+        azimuths, elevations = request.angles(shape)
+        if method == "auto" and request.monostatic:
+            method = monostatic_method(shape, request.wavenumbers, boundary, len(azimuths))
+        told = forecast(
+            shape,
+            request.wavenumbers,
+            boundary,
+            method=method,
+            radar=(azimuths, elevations) if request.monostatic else request.incidence,
+            observers=1 if request.monostatic else len(azimuths),
+            metres=True,
+            cure=request.cure,
+        )
+        progress.note(f"{told.body}, {boundary_words(boundary)}")
+        unfinished = resuming.begun(output, quantity, resuming.asked_for(body, shape, **options), resume=resume)
+        if unfinished is None:
+            print((output / resuming.SUMMARY).read_text() if as_json else f"nothing is missing in {output}")
+            return 0
+        values = len(azimuths) * len(request.wavenumbers)
+        progress(f"{echo_report.asked_words(azimuths, request)} by {told.by}")
+        progress.begin(0, values)
 
-    def progress(text: str) -> None:
-        if not as_json:
-            print(f"creeping: {text} ...", file=sys.stderr, flush=True)
+        def rows(found: Any) -> None:
+            echo_report.write_rows(unfinished, request, found)
 
-    shape = parse_body(body, progress=progress, **made)
-    azimuths, elevations = request.angles(shape)
-    meter = _Meter(progress, len(azimuths) * len(request.wavenumbers))
-    if method == "auto" and request.monostatic:
-        method = monostatic_method(shape, request.wavenumbers, boundary, len(azimuths))
-    told = forecast(
-        shape,
-        request.wavenumbers,
-        boundary,
-        method=method,
-        radar=(azimuths, elevations) if request.monostatic else request.incidence,
-        observers=1 if request.monostatic else len(azimuths),
-        metres=True,
-        cure=request.cure,
-    )
-    if not as_json:
-        print(f"creeping: {told.body}, {boundary_words(boundary)}", file=sys.stderr)
-    progress(f"{meter.asked(request)} by {told.by}")
-    ready = time.perf_counter()
-    dataset = echo_report.computed(shape, request, boundary, azimuths, elevations, method, made["cache"], meter.told)
-    echo = echo_of(dataset, quantity, request.channels, request.angle_name, sound_speed=request.sound_speed)
-    computed = time.perf_counter()
-    progress("tables and pictures" if written["pictures"] else "tables")
-    compared, refused = echo_report.compared(echo, reference, measured[2])
-    names, extra = echo_report.write_results(output, echo, compared, shape, body, **written)
-    summary = echo_report.summary_of(body, request, echo, dataset) | extra | refused
-    now = time.perf_counter()
-    summary |= {"seconds": round(now - started, 2), "seconds_of_fields": round(computed - ready, 2)}
-    summary["files"] = [*names, "summary.json"]
-    from creeping.files import write_text
+        def passed(done: float, total: int, seconds: float) -> None:
+            progress.told(values * done / total, values, seconds)
 
-    write_text(output / "summary.json", json.dumps(summary, indent=1) + "\n")
+        with resuming.kept(unfinished, progress.message):
+            dataset = echo_report.computed(
+                shape, request, boundary, azimuths, elevations, method, made["cache"], unfinished, passed, rows
+            )
+            echo = echo_report.echo_for(request, dataset)
+            progress("tables and pictures" if written["pictures"] else "tables")
+            compared, refused = echo_report.compared(echo, reference, measured[2])
+            names, extra = echo_report.write_results(output, echo, compared, shape, body, **written)
+            summary = echo_report.summary_of(body, request, echo, dataset) | extra | refused
+            summary["files"] = [*names, resuming.SUMMARY]
+            unfinished.write_summary(summary, complete=True)
+            unfinished.finished()
+    summary |= {"complete": True, "seconds": round(time.perf_counter() - started, 2)}
     print(json.dumps(summary, indent=1) if as_json else echo_report.readable(summary, output))
     return 0
-
-
-class _Meter:
-    """Says how much is asked for, and how long it takes once that can be told."""
-
-    def __init__(self, progress: Any, values: int) -> None:
-        self.progress, self.values, self._shown = progress, values, 0.0
-        self._first: tuple[float, float] | None = None
-
-    def asked(self, request: Any) -> str:
-        """What is computed."""
-        several = len(request.wavenumbers)
-        count = self.values // several
-        return f"{count} angle{'s' * (count > 1)} x {several} frequenc{'ies' if several > 1 else 'y'}"
-
-    def told(self, done: float, total: int, seconds: float) -> None:
-        """Show what is left, by what came after the first part, which may have had to compile."""
-        if self._first is None:
-            self._first = (done, seconds)
-            return
-        first, then = self._first
-        if done > first and seconds - self._shown > 5 and done < total:
-            self._shown = seconds
-            left = (total - done) * (seconds - then) / (done - first)
-            self.progress(f"{int(self.values * done / total)} of {self.values}, {left:.0f} s left")

@@ -10,7 +10,7 @@ from creeping.field.arguments import checked_across
 from creeping.field.boundary import BoundaryLike, boundary_name
 from creeping.field.equation.effort import ASKED, is_large, plan_of
 from creeping.field.tmatrix.computing import expected
-from creeping.field.validity_range import EDGE, body_validity
+from creeping.field.validity_range import is_reached
 from creeping.geodesics.equations import points_of_charts
 from creeping.geometry.checks import unit_of
 from creeping.geometry.directions import azimuth_elevation_of
@@ -138,7 +138,7 @@ def forecast(
         by = f"nothing within five minutes: {refused}; creeping.solve(..., seconds=) takes as long as it may"
     elif has_edges(shape):
         by = f"rays and physical optics, which err by several per cent (0.5 dB): the equation is not solved, {refused}"
-    elif not refused and not _reached(shape, k):
+    elif not refused and not is_reached(shape, float(k.min())):
         by = f"{equation}, as parts are more curved than rays and currents allow"
     else:
         takes = _cost(shape, k, incidences, observers, boundary)
@@ -161,17 +161,11 @@ def _cost(
     return f"up to about {duration(seconds)} if currents serve all, " if seconds else ""
 
 
-def _reached(shape: Any, k: FloatArray) -> bool:
-    """Whether the expansions of rays and currents reach to the lowest wavenumber."""
-    found = body_validity(shape, wavenumber=float(k.min()))
-    return found.least_k_rho >= EDGE[0] and found.largest_transverse <= EDGE[1]
-
-
 def _errors(shape: Any, k: FloatArray) -> str:
     """How far rays and currents err, by the lowest wavenumber."""
     if why_no_rays(shape) or has_edges(shape):
         return "errors of several per cent of the largest amplitude (0.5 dB)"
-    if _reached(shape, k):
+    if is_reached(shape, float(k.min())):
         return "errors of 0.1 to 5 % of the largest amplitude (0.4 dB)"
     return "errors of up to 40 % of the largest amplitude (3 dB), as parts are more curved than a wavelength allows"
 

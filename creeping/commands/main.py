@@ -13,10 +13,12 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Group, Parameter, validators
 
+from creeping._progress import Progress
 from creeping._version import __version__
 from creeping.commands import check as _checking
 from creeping.commands import echo as _echo_command
 from creeping.commands import explore as _explore_command
+from creeping.commands import resuming
 from creeping.commands import sweep as _sweep_command
 from creeping.commands import upkeep as _upkeep
 from creeping.commands.body import AS_IT_IS, HELP, Body, FileOptions, SpeedOption, parse_body, table_formats, title_of
@@ -45,6 +47,7 @@ def main(arguments: list[str] | None = None) -> None:
     from creeping.errors import CreepingError
 
     given = sys.argv[1:] if arguments is None else arguments
+    resuming.words[:] = given
     if sorted(given) == ["--json", "--version"]:
         print(json.dumps(_upkeep.versions(), indent=1))
         raise SystemExit(0)
@@ -173,8 +176,12 @@ def run(
     ] = "auto",
     formats: Annotated[str, Parameter(name="--format", group=_output, help=HELP)] = "csv",
     json_: Json = False,
+    resume: _echo_command.Resume = False,
 ) -> int:
     """Shadow line, creeping rays, iso-phase curves, pictures and files for one incidence."""
+    options = {name: value for name, value in locals().items() if name not in ("body", "file", "output", "json_")}
+    options |= file.given()
+    del options["resume"]
     import numpy as np
 
     import creeping as cr
@@ -196,7 +203,7 @@ def run(
     of = of or ("travel_time" if source is None else "eikonal")
     incident = _run_results.asked_wave(direction, source)
     job = _field_run.job(wavenumber, boundary, observe, direction, **wave)
-    with _Progress(quiet=json_) as progress:
+    with Progress(quiet=json_) as progress:
         shape = parse_body(body, speed, options=file, cache=cache, progress=progress)
         planes = _plane_run.asked_planes(plane, job)
         if job:
@@ -205,9 +212,13 @@ def run(
             kind = _forecast.boundary_words(job.boundary)
             progress.note(f"{kind}{'' if boundary else ', as no --boundary is given'}: far field by {told.by}")
             job = job.fitted(shape)
+        unfinished = resuming.begun(output, "run", resuming.asked_for(body, shape, **options), resume=resume)
+        if unfinished is None:
+            print((output / resuming.SUMMARY).read_text() if json_ else f"nothing is missing in {output}")
+            return 0
         if why_no_rays(shape):
             result = _run_solved.run_solved(
-                shape, job, incident, output, body, planes, tables, pictures, backend, progress
+                shape, job, incident, output, body, planes, tables, pictures, backend, progress, unfinished
             )
             print(json.dumps(result, indent=1) if json_ else _run_solved.readable(result, output))
             return 0
@@ -221,27 +232,27 @@ def run(
         step = spacing or fan.length / 16
         curves = cr.iso_phase_curves(fan, levels_of(fan, step, of), of=of)
         summary = _run_results.summary_of(body, speed, line, carrier, fan, curves)
-        if job:
-            progress("field")
-            far, field_seconds = job.far_field(fan)
-        progress("pictures and files" if pictures else "files")
-        drawn_with = backend if pictures else None
-        summary["files"], summary["drawn_by"] = _run_results.write_results(
-            output, line, fan, curves, drawn_with, tables, name=title_of(body), **(job.wave if job else {})
-        )
-        written: dict[str, Any] = {"pictures": pictures, "formats": tables}
-        if job:
-            summary["field"], names = job.write(far, fan, output, backend, title_of(body), **written)
-            summary["field"]["seconds"] = field_seconds
-            summary["files"][-1:-1] = names
-        if job and planes:
-            asked = planes, job, fan, output, title_of(body), progress
-            summary["planes"], names = _plane_run.write_planes(*asked, **written)
-            summary["files"][-1:-1] = names
-        summary["seconds"] = round(time.perf_counter() - started, 2)
-        from creeping.files import write_text
-
-        write_text(output / "summary.json", json.dumps(summary, indent=1) + "\n")
+        with resuming.kept(unfinished, progress.message):
+            if job:
+                progress("field")
+                far, field_seconds = job.far_field(fan, unfinished, progress.told)
+            progress("pictures and files" if pictures else "files")
+            drawn_with = backend if pictures else None
+            summary["files"], summary["drawn_by"] = _run_results.write_results(
+                output, line, fan, curves, drawn_with, tables, name=title_of(body), **(job.wave if job else {})
+            )
+            written: dict[str, Any] = {"pictures": pictures, "formats": tables}
+            if job:
+                summary["field"], names = job.write(far, fan, output, backend, title_of(body), **written)
+                summary["field"]["seconds"] = field_seconds
+                summary["files"][-1:-1] = names
+            if job and planes:
+                asked = planes, job, fan, output, title_of(body), progress
+                summary["planes"], names = _plane_run.write_planes(*asked, **written)
+                summary["files"][-1:-1] = names
+            summary["seconds"] = round(time.perf_counter() - started, 2)
+            unfinished.write_summary(summary, complete=True)
+            unfinished.finished()
     print(json.dumps(summary, indent=1) if json_ else _run_results.readable(summary, output))
     return 0
 
@@ -328,7 +339,7 @@ def figure(
         near = near_names(name, studies.FIGURES) or f"; figures are {', '.join(studies.FIGURES)}"
         raise InvalidInputError(f"unknown figure {name!r}{near}")
     cards = []
-    with _Progress(quiet=json_) as progress:
+    with Progress(quiet=json_) as progress:
         for key in studies.FIGURES if name is None else [name]:
             progress(f"figure {key}")
             cards.append(studies.draw(key, output, quick=quick))
@@ -349,37 +360,3 @@ cache_app.command(_upkeep.list_maps, name="ls")
 cache_app.command(_upkeep.verify_maps, name="verify")
 cache_app.command(_upkeep.clear_maps, name="clear")
 app.command(_upkeep.doctor)
-
-
-class _Progress:
-    """What is being done, on standard error: a spinner on a terminal, plain lines elsewhere."""
-
-    def __init__(self, *, quiet: bool) -> None:
-        self.quiet = quiet
-        self._status: Any = None
-
-    def __enter__(self) -> "_Progress":
-        if not self.quiet and sys.stderr.isatty():
-            from rich.console import Console
-
-            self._status = Console(stderr=True).status("starting")
-            self._status.start()
-        return self
-
-    def note(self, text: str) -> None:
-        """Show what is to stay."""
-        if self._status is not None:
-            self._status.console.print(f"creeping: {text}", highlight=False, markup=False, soft_wrap=True)
-        elif not self.quiet:
-            print(f"creeping: {text}", file=sys.stderr, flush=True)
-
-    def __call__(self, text: str) -> None:
-        """Show what is being done now."""
-        if self._status is not None:
-            self._status.update(text)
-        elif not self.quiet:
-            print(f"creeping: {text} ...", file=sys.stderr, flush=True)
-
-    def __exit__(self, *_: object) -> None:
-        if self._status is not None:
-            self._status.stop()

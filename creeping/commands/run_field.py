@@ -12,6 +12,7 @@ from creeping import files, plotting
 from creeping._typing import ArrayLike, FloatArray
 from creeping.commands.body import write_tables
 from creeping.commands.forecast import Forecast, forecast, radar_of
+from creeping.commands.resuming import Unfinished
 from creeping.commands.wave import asked_wavenumber, cure_of, frequency_words
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.body_currents import cached_currents
@@ -19,7 +20,7 @@ from creeping.field.boundary import BoundaryLike, parse_boundary
 from creeping.field.comparison import cross_section_decibels
 from creeping.field.equation.solution import Solution
 from creeping.field.equation.solving import solved_alone
-from creeping.field.far import far_field
+from creeping.field.far import far_in_parts
 from creeping.field.far_result import FarField, turned_to_azimuth
 from creeping.field.forward import lobe_step
 from creeping.field.uncertainty import far_field_uncertainty
@@ -30,6 +31,7 @@ from creeping.geometry.incident import REMEDY, PlaneWave, incident_words
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan
+from creeping.storage.parts import Arrays
 
 ORDER = 2
 DPI = 200
@@ -124,17 +126,51 @@ class Job:
             return wave
         return f"{frequency_words(self.frequency)}, {wave}"
 
-    def far_field(self, fan: RayFan) -> tuple[FarField, float]:
+    def far_field(
+        self, fan: RayFan, unfinished: Unfinished, told: Callable[[float, int], None] = lambda *_: None
+    ) -> tuple[FarField, float]:
         """Far field in the directions of all targets, one after the other, and the seconds that it took."""
         started = time.perf_counter()
-        far = far_field(fan, self.directions, wavenumber=self.wavenumber, boundary=self.boundary, order=ORDER)
+        asked: dict[str, Any] = {"wavenumber": self.wavenumber, "boundary": self.boundary, "order": ORDER}
+        parts, there = unfinished.kept_parts(), list[FarField]()
+        count = len(self.directions)
+
+        def keep(name: str, make: Callable[[], Arrays]) -> Arrays:
+            found = parts(name, make)
+            if not name.startswith("rays-"):
+                return found
+            there.append(FarField.unpacked(found))
+            done = sum(len(one.total) for one in there)
+            told(done, count)
+            if done < count:
+                unfinished.now_and_then(lambda: self._write_rows(FarField.joined(there), unfinished))
+            return found
+
+        try:
+            far = far_in_parts(fan, self.directions, keep=keep, **asked)
+        except BaseException:
+            if there:
+                self._write_rows(FarField.joined(there), unfinished)
+            raise
         return self._turned(far), round(time.perf_counter() - started, 2)
 
-    def solved(self, body: Any, direction: ArrayLike, tell: Callable[[str], None]) -> tuple[Solution, FarField, float]:
+    def _write_rows(self, far: FarField, unfinished: Unfinished) -> None:
+        """Write the rows of the first directions, with marks that others are missing."""
+        done, count = len(far.total), len(self.directions)
+        mark = f"incomplete: {done} of {count} directions; {unfinished.mark}"
+        texts = [target.text for target in self.targets for _ in target.directions][:done]
+        angles = np.concatenate([target.angles for target in self.targets])[:done]
+        files.write_csv(unfinished.output / "far.csv", far=self._turned(far), observed=(texts, angles), mark=mark)
+        words = {"directions_done": done, "directions": count, "resume": unfinished.again}
+        unfinished.write_summary(words, complete=False)
+
+    def solved(
+        self, body: Any, direction: ArrayLike, tell: Callable[[str], None], unfinished: Unfinished
+    ) -> tuple[Solution, FarField, float]:
         """The same of a body without rays, by its integral equation, whose solution comes first."""
         started = time.perf_counter()
-        d = unit_directions(direction, "direction").reshape(-1, 3)
-        solution = solved_alone(body, d, self.wavenumber, self.boundary, tell=tell)
+        keep, d = unfinished.kept_parts(), unit_directions(direction, "direction").reshape(-1, 3)
+        solution = solved_alone(body, d, self.wavenumber, self.boundary, tell=tell, keep=keep)
         far = self._turned(solution.far_field(self.directions))
         return solution, far, round(time.perf_counter() - started, 2)
 
@@ -146,7 +182,8 @@ class Job:
     def _turned(self, far: FarField) -> FarField:
         """A far field in the frames of the targets and the unit that was asked for."""
         if far.total.ndim == 3:
-            turn = np.concatenate([target.frames for target in self.targets])
+            # of the first directions, where not all are there yet
+            turn = np.concatenate([target.frames for target in self.targets])[: len(far.total)]
             parts = {name: np.einsum("nab,nbc->nac", turn, values) for name, values in far.parts.items()}
             # of a component and of the other at a pole, which the turn may exchange
             error = np.sqrt(np.einsum("nab,nbc->nac", turn**2, far.error**2))

@@ -1,17 +1,17 @@
 """``creeping run`` of a body without rays, on its facets or of several: its far field. Part of the command line."""
 
-import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from creeping._progress import Progress
 from creeping._version import __version__
 from creeping.commands.body import title_of
+from creeping.commands.resuming import Unfinished, kept
 from creeping.commands.run_field import Job
 from creeping.commands.run_report import wave_entry
 from creeping.errors import InvalidInputError
-from creeping.files import write_text
 from creeping.geometry.arguments import rays_refused
 from creeping.geometry.parts import why_no_rays
 
@@ -26,7 +26,8 @@ def run_solved(
     formats: Sequence[str],
     pictures: bool,
     backend: str,
-    progress: Callable[[str], None],
+    progress: Progress,
+    unfinished: Unfinished,
 ) -> dict[str, Any]:
     """Write the far field of a plane wave on a body without rays; returns the summary.
 
@@ -43,20 +44,18 @@ def run_solved(
             f"{what} is of bodies with rays; {why_no_rays(shape)}: creeping.solve gives near fields"
         )
     started = time.perf_counter()
-    solution, far, seconds = job.solved(shape, incident.direction, progress)
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InvalidInputError(f"cannot make the folder {output}: {error}; choose another with -o") from error
-    progress("pictures and files" if pictures else "files")
-    summary: dict[str, Any] = {"body": body, "version": __version__, **wave_entry(incident)}
-    summary |= {"rays": None, "without_rays": why_no_rays(shape), "nodes": solution.nodes}
-    summary["field"], names = job.write(
-        far, solution, output, backend, title_of(body), pictures=pictures, formats=formats
-    )
-    summary["field"]["seconds"], summary["files"] = seconds, [*names, "summary.json"]
-    summary["seconds"] = round(time.perf_counter() - started, 2)
-    write_text(output / "summary.json", json.dumps(summary, indent=1) + "\n")
+    with kept(unfinished, progress.message):
+        solution, far, seconds = job.solved(shape, incident.direction, progress, unfinished)
+        progress("pictures and files" if pictures else "files")
+        summary: dict[str, Any] = {"body": body, "version": __version__, **wave_entry(incident)}
+        summary |= {"rays": None, "without_rays": why_no_rays(shape), "nodes": solution.nodes}
+        summary["field"], names = job.write(
+            far, solution, output, backend, title_of(body), pictures=pictures, formats=formats
+        )
+        summary["field"]["seconds"], summary["files"] = seconds, [*names, "summary.json"]
+        summary["seconds"] = round(time.perf_counter() - started, 2)
+        unfinished.write_summary(summary, complete=True)
+        unfinished.finished()
     return summary
 
 

@@ -3,15 +3,15 @@
 import json
 import shlex
 import signal
-import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import Group, Parameter
 
+from creeping._progress import Progress
 from creeping.commands.body import FileOptions, is_file, parse_body
 
 PARTIAL, ALL_FAILED = 4, 3
@@ -20,8 +20,6 @@ PILOT = 2
 """Tasks by which a sweep is timed; the first may have to compile."""
 LARGE = 1800.0
 """Seconds left from which a sweep is shared among the cores by itself."""
-QUIET = 5.0
-"""Seconds between lines of progress."""
 _output = Group("Output")
 _workers = Group("Workers")
 
@@ -76,17 +74,17 @@ def sweep(
     started = time.perf_counter()
     if scheduler is None and workers is None:
         workers = read.workers
-    with _Meter(quiet=json_) as meter:
-        plan, store = _prepared(read, folder, resume, cache, meter.show)
+    with Progress("incidences", quiet=json_) as meter:
+        plan, store = _prepared(read, folder, resume, cache, meter)
         again = ["creeping", "sweep", str(study), "--resume", "-o", str(folder)]
         again += ["--scheduler", scheduler] if scheduler else []
         again += ["--workers", str(workers)] if workers else []
         # one lock for all: nobody slips in between
         with store.locked():
             if verify:
-                meter.show("verifying")
+                meter("verifying")
                 for task, reason in store.verify(repair=True):
-                    meter.show(f"task {task} is computed anew: {reason}")
+                    meter.note(f"task {task} is computed anew: {reason}")
             missing = sum(plan.rows(task).stop - plan.rows(task).start for task in store.missing())
             meter.begin(len(plan.incidences) - missing, len(plan.incidences))
             running = time.perf_counter()
@@ -108,7 +106,7 @@ def sweep(
     return PARTIAL if failed or not complete else 0
 
 
-def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Any) -> tuple[Any, Any]:
+def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Progress) -> tuple[Any, Any]:
     """Plan and store of a study; the flow of a sweep that goes on is the one it was begun with."""
     from creeping.commands.forecast import boundary_words, forecast
     from creeping.field.boundary import parse_boundary
@@ -129,8 +127,8 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Any)
     request = read.request_for(body)
     if request.wavenumbers:
         told = forecast(body, request.wavenumbers, parse_boundary(request.boundaries[0]), method=request.method)
-        progress(f"{told.body}, {boundary_words(*request.boundaries)}")
-        progress(f"each incidence by {told.by}")
+        progress.note(f"{told.body}, {boundary_words(*request.boundaries)}")
+        progress.note(f"each incidence by {told.by}")
     progress("flow")
     if resume and folder.exists():
         store = SweepStore.open(folder, mending=True)
@@ -147,7 +145,7 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Any)
         asked={"flow": read.flow, "tolerance": read.tolerance},
         text=read.text,
     )
-    return plan, open_store(plan, folder, resume=resume, note=progress)
+    return plan, open_store(plan, folder, resume=resume, note=progress.note)
 
 
 def _flow(read: Any, body: Any, request: Any, cache: bool, progress: Any) -> Any:
@@ -167,34 +165,34 @@ def _flow(read: Any, body: Any, request: Any, cache: bool, progress: Any) -> Any
     return cr.build_phase_map(body, **asked) if read.flow == "map" else cr.choose_flow(body, **asked)
 
 
-def _run(plan: Any, store: Any, scheduler: str | None, workers: int | None, meter: "_Meter") -> tuple[bool, int]:
+def _run(plan: Any, store: Any, scheduler: str | None, workers: int | None, meter: Progress) -> tuple[bool, int]:
     """Fill the store: whether it is complete, and the number of incidences done now."""
     from creeping.kernels.threads import thread_count
     from creeping.sweeping.run import fill
 
     with _stopping(meter) as asked:
-        options: dict[str, Any] = {"progress": meter.progress, "stop": asked.is_set}
+        options: dict[str, Any] = {"progress": meter.told, "stop": asked.is_set}
         if scheduler is None and workers is None:
             complete = fill(plan, store, most=PILOT, **options)
             # cores, unless the user has fewer in mind
             if complete or asked.is_set() or meter.left() < LARGE or thread_count() == 1:
                 return complete or fill(plan, store, **options), meter.done_now
             workers = thread_count()
-            meter.show(f"about {meter.left():.0f} s are left: sharing them among {workers} worker processes")
+            meter.note(f"about {meter.left():.0f} s are left: sharing them among {workers} worker processes")
         if workers is not None:
             from creeping.sweeping.results import require
 
             require("distributed")
             from creeping.sweeping.cluster.driver import local_client
 
-            meter.show(f"starting {workers} worker processes")
+            meter.note(f"starting {workers} worker processes")
             with local_client(workers) as client:
                 return fill(plan, store, client=client, **options), meter.done_now
         return fill(plan, store, client=scheduler, **options), meter.done_now
 
 
 @contextmanager
-def _stopping(meter: "_Meter") -> Iterator[Any]:
+def _stopping(meter: Progress) -> Iterator[Any]:
     """Event that the first SIGINT or SIGTERM sets; the second is an interrupt as always."""
     import threading
 
@@ -204,7 +202,7 @@ def _stopping(meter: "_Meter") -> Iterator[Any]:
         if asked.is_set():
             raise KeyboardInterrupt
         asked.set()
-        meter.show("finishing the tasks that have begun; interrupt again to stop at once")
+        meter.note("finishing the tasks that have begun; interrupt again to stop at once")
 
     if threading.current_thread() is not threading.main_thread():
         yield asked
@@ -230,7 +228,6 @@ def _summary(plan: Any, store: Any, complete: bool) -> dict[str, Any]:
         "flow": store.key["flow"],
         "tasks": store.tasks,
         "chunk": store.chunk,
-        "seconds_of_sweep": dataset.attrs["seconds"],
         "digest": plan.digest,
     }
 
@@ -254,70 +251,3 @@ def _readable(summary: dict[str, Any]) -> str:
         why = "to try again those that failed" if summary["complete"] else "not complete; to go on"
         rows.append(f"{why}: {summary['resume']}")
     return "\n".join(rows)
-
-
-class _Meter:
-    """Progress on standard error: a bar with the time left on a terminal, now and then a line elsewhere."""
-
-    def __init__(self, *, quiet: bool) -> None:
-        self.quiet = quiet
-        self._begun = 0
-        self._first: tuple[int, float] | None = None
-        self._last: tuple[int, int, float] = (0, 0, 0.0)
-        self._shown = time.monotonic()
-        self._bar: Any = None
-        self._bars: Any = nullcontext()
-
-    def __enter__(self) -> "_Meter":
-        if not self.quiet and sys.stderr.isatty():
-            from rich.console import Console
-            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-            columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-            self._bars = Progress(*columns, TextColumn("{task.fields[left]}"), console=Console(stderr=True))
-            self._bar = self._bars.add_task("starting", total=None, left="")
-        self._bars.__enter__()
-        return self
-
-    def __exit__(self, *details: Any) -> None:
-        self._bars.__exit__(*details)
-
-    def show(self, text: str) -> None:
-        """Show what is being done now."""
-        if not self.quiet:
-            self.message(text)
-
-    def message(self, text: str) -> None:
-        """Show what must be known, quiet or not."""
-        if self._bar is not None:
-            self._bars.console.print(f"creeping: {text}", highlight=False, markup=False, soft_wrap=True)
-        else:
-            print(f"creeping: {text}", file=sys.stderr, flush=True)
-
-    @property
-    def done_now(self) -> int:
-        """Incidences that were done since `begin`."""
-        return self._last[0] - self._begun
-
-    def begin(self, done: int, total: int) -> None:
-        """Say how many incidences are done already."""
-        self._begun, self._last = done, (done, total, time.monotonic())
-
-    def progress(self, done: int, total: int, _: float) -> None:
-        """Show how many incidences are done."""
-        now = time.monotonic()
-        if self._first is None:
-            self._first = (done, now)
-        self._last = (done, total, now)
-        left = f"{self.left():.0f} s left" if self.left() else ""
-        if self._bar is not None:
-            self._bars.update(self._bar, description="sweep", completed=done, total=total, left=left)
-        elif now - self._shown > QUIET or done == total:
-            self._shown = now
-            self.show(f"{done} of {total} incidences" + (f", {left}" if left else ""))
-
-    def left(self) -> float:
-        """Seconds left, by what came after the first task."""
-        done, total, now = self._last
-        first, then = self._first or (0, 0.0)
-        return (total - done) * (now - then) / (done - first) if done > first else 0.0

@@ -22,7 +22,9 @@ Sources: [LK59], [CK13]; Derivations, F10 to F17 and F17.
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -48,11 +50,14 @@ from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
 from creeping.storage.memory import blocks, within_budget
+from creeping.storage.parts import Keeping, not_kept
 
 KEPT_BYTES, RAY_BYTES, FAN_BYTES = 1000.0, 24_000.0, 200.0
 """Of a direction: its field, of a conductor, twice while parts are joined; what rays take, twice as the geometry of the
 directions before is kept; and for each k size, the fan integral."""
 
+TOGETHER = 1024
+"""Directions by rays that are kept at a time: some seconds of work."""
 NODES = 50_000
 """Nodes of the currents that rays are compared with: some tenths of a second."""
 DIRECTIONS = 200
@@ -114,6 +119,20 @@ def far_field(
     >>> round(float(abs(ff.total[0])), 3), bool(ff.error[0] < 2e-3), ff.method.tolist()     # about radius/2
     (0.504, True, ['currents'])
     """
+    return far_in_parts(fan, observation, wavenumber=wavenumber, boundary=boundary, order=order, method=method)
+
+
+def far_in_parts(
+    fan: RayFan,
+    observation: ArrayLike,
+    *,
+    wavenumber: float,
+    boundary: BoundaryLike,
+    order: int,
+    method: str = "auto",
+    keep: Keeping = not_kept,
+) -> FarField:
+    """The same, what is ready of it given to ``keep``: ``rays-`` of some directions after the other, or sums."""
     one_of(fan, "fan", RayFan, "creeping.launch")
     checked_plain(fan.body)
     kinds = scalar_boundaries(boundary)
@@ -141,17 +160,30 @@ def far_field(
     if currents:
         # the equation knows of tips, expansions do not
         left_out = tip_waves(fan, k) if piecewise and not currents.solved else 0.0
-        far = far_by_currents(currents, r, boundary, left_out=left_out)
+        far = far_by_currents(currents, r, boundary, left_out=left_out, keep=keep)
         return replace(far, validity=validity(fan, wavenumber=k))
     if piecewise:
-        far = piecewise_far_field(fan, r, k, boundary, order)
+        far = _kept(keep, "optics", partial(piecewise_far_field, fan, r, k, boundary, order))
         return replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
     within_budget(KEPT_BYTES * len(r), f"the field in {len(r)} directions", "ask for fewer", asked=len(r))
-    parts = blocks(len(r), RAY_BYTES + FAN_BYTES * k * size(fan.body))
-    far = FarField.joined([field_of(far_geometry(fan, r[some]), k, boundary, order) for some in parts])
+    # what is kept has the same parts whatever memory is free
+    each = RAY_BYTES + FAN_BYTES * k * size(fan.body)
+    firsts = range(0, len(r), TOGETHER)
+    parts = blocks(len(r), each) if keep is not_kept else [slice(first, first + TOGETHER) for first in firsts]
+
+    def some_of(some: slice) -> FarField:
+        return field_of(far_geometry(fan, r[some]), k, boundary, order)
+
+    far = FarField.joined([_kept(keep, f"rays-{some.start}", partial(some_of, some)) for some in parts])
     far = replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
     level = measured_level(fan, k, boundary) if auto else None
     return level.applied(far) if level else far
+
+
+def _kept(keep: Keeping, name: str, make: Callable[[], FarField]) -> FarField:
+    if keep is not_kept:
+        return make()
+    return FarField.unpacked(keep(name, lambda: make().packed()))
 
 
 class Level(NamedTuple):

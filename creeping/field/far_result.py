@@ -14,6 +14,7 @@ Sources: Derivations, F14.
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -38,6 +39,8 @@ from creeping.storage.memory import required
 BY_DIRECTION = ("directions", "total", "method", "unresolved", "error")
 """Arrays of a far field whose first axis is the direction, its parts apart."""
 
+ONE_EACH = ("error_by", "wavenumber", "boundary", "order", "measured_at", "unit")
+"""What all directions share."""
 CLEAR = 1e-6
 """Least |n × d| that has a direction: normals are known to 1e-11, and d and r share ``spare`` to this angle."""
 ACROSS = 1e-6
@@ -152,6 +155,25 @@ class FarField(Drawn):
         parts = {name: np.concatenate([one.parts[name] for one in fields]) for name in fields[0].parts}
         lanes: dict[str, Any] = {n: np.concatenate([getattr(one, n) for one in fields]) for n in BY_DIRECTION}
         return replace(fields[0], parts=parts, **lanes)
+
+    def packed(self) -> dict[str, np.ndarray[Any, Any]]:
+        """Arrays of numbers, from which `unpacked` makes it again."""
+        names, codes = np.unique(self.method, return_inverse=True)
+        words = {name: getattr(self, name) for name in ONE_EACH}
+        words |= {"methods": names.tolist(), "validity": None if self.validity is None else list(self.validity)}
+        arrays = {name: getattr(self, name) for name in BY_DIRECTION if name != "method"}
+        arrays |= {f"part_{name}": values for name, values in self.parts.items()}
+        return arrays | {"codes": codes, "words": np.frombuffer(json.dumps(words).encode(), dtype=np.uint8)}
+
+    @staticmethod
+    def unpacked(arrays: dict[str, np.ndarray[Any, Any]]) -> FarField:
+        """The far field of arrays that `packed` has made."""
+        words = json.loads(bytes(arrays["words"]))
+        names, validity = words.pop("methods"), words.pop("validity")
+        words["validity"] = None if validity is None else Validity(*validity)
+        lanes: dict[str, Any] = {n: np.array(arrays[n]) for n in BY_DIRECTION if n != "method"}
+        parts = {n.removeprefix("part_"): np.array(v) for n, v in arrays.items() if n.startswith("part_")}
+        return FarField(parts=parts, method=np.array(names)[arrays["codes"]], **lanes, **words)
 
     @property
     def cross_section(self) -> FloatArray:

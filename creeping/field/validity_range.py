@@ -176,6 +176,12 @@ def body_validity(body: Surface, *, wavenumber: float) -> Validity:
     )
 
 
+def is_reached(body: Surface, wavenumber: float) -> bool:
+    """Whether the expansions of rays and currents reach to a wavenumber, at their edge at least."""
+    found = body_validity(body, wavenumber=wavenumber)
+    return found.least_k_rho >= EDGE[0] and found.largest_transverse <= EDGE[1]
+
+
 def validity_words(found: Validity, *, measured: bool = False) -> str:
     """What both numbers say of a field, for a reader; ``measured`` if its error is, which then counts for more.
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
-from creeping._typing import Any, FloatArray
+from creeping._typing import Any, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.files import tables as _cut_table
 from creeping.files import tables as _far_table
@@ -147,6 +147,7 @@ def write_csv(
     far: "FarField | None" = None,
     cut: "FieldCut | None" = None,
     observed: tuple[Sequence[str], FloatArray] | None = None,
+    mark: str = "",
 ) -> None:
     """Write one table as CSV, one row per point or direction, its columns explained in lines that begin with ``#``.
 
@@ -158,6 +159,8 @@ def write_csv(
         Exactly one of them: they have different columns.
     observed : (texts, angles), optional
         Of a far field: what each direction was asked for as, and its angle along the cut (m,), degrees.
+    mark : str
+        What the first line says of rows that are missing.
 
     Raises
     ------
@@ -173,6 +176,7 @@ def write_csv(
             f"write_csv got {' and '.join(given) or 'nothing'}; give exactly one of {', '.join(parts)}, a file for each"
         )
     with written_aside(path) as aside, aside.open("w", encoding="ascii", newline="\n") as stream:
+        stream.writelines([f"# {mark}\n"] if mark else [])
         if line is not None:
             _write_table(stream, _in_unit(_LINE_NOTES, unit_of(line.body)), _line_rows(line))
         elif fan is not None:
@@ -342,8 +346,17 @@ def _spelled(suffix: str) -> str:
     return {"t": "theta", "p": "phi"}[suffix[1]]
 
 
-def write_echo(path: str | os.PathLike[str], echo: "Echo") -> None:
+def write_echo(path: str | os.PathLike[str], echo: "Echo", *, known: BoolArray | None = None, mark: str = "") -> None:
     """Write an echo as CSV.
+
+    Parameters
+    ----------
+    path : str or path
+    echo : Echo
+    known : (n, k) of bool, optional
+        Angles and wavenumbers whose rows are written.
+    mark : str
+        What the first line says of rows that are missing.
 
     Raises
     ------
@@ -363,10 +376,13 @@ def write_echo(path: str | os.PathLike[str], echo: "Echo") -> None:
     }
     hertz = echo.hertz
     with written_aside(path) as aside, open(aside, "w", encoding="utf-8", newline="\n") as stream:
+        stream.writelines([f"# {mark}\n"] if mark else [])
         stream.writelines(f"# {key}: {text}\n" for key, text in words.items() if text)
         stream.write(",".join(words) + "\n")
         for at in np.ndindex(total.shape):
             c, n, k = at
+            if known is not None and not known[n, k]:
+                continue
             row: list[Any] = [
                 echo.channels[c],
                 echo.azimuth[n],

@@ -31,19 +31,22 @@ PATIENT = 50_000, 50, 100
 with those of Python it takes an eighth of the time."""
 
 
+_watching: list["_FirstUse"] = []
+
+
 class _FirstUse(events.Listener):  # type: ignore[misc]
     """Hears of every compilation, and of those within it; kernels may be compiled in several threads."""
 
     def __init__(self, folder: Path, digest: str) -> None:
         self._folder, self._digest = folder, digest
-        self._lock, self._depth, self._told = threading.Lock(), 0, False
+        self._lock, self.depth, self._told = threading.Lock(), 0, False
         self._thresholds = gc.get_threshold()
 
     def on_start(self, event: Any) -> None:
         """Tell of the first kernel, start to compile ahead, and let the garbage wait."""
         with self._lock:
-            self._depth += 1
-            if self._depth == 1:
+            self.depth += 1
+            if self.depth == 1:
                 self._thresholds = gc.get_threshold()
                 if gc.isenabled():
                     gc.set_threshold(*PATIENT)
@@ -61,15 +64,21 @@ class _FirstUse(events.Listener):  # type: ignore[misc]
     def on_end(self, event: Any) -> None:
         """Have the garbage collected as before."""
         with self._lock:
-            self._depth -= 1
-            if self._depth == 0:
+            self.depth -= 1
+            if self.depth == 0:
                 gc.set_threshold(*self._thresholds)
 
 
 def watch(folder: Path, digest: str) -> None:
     """Tell of compilations from now on; ``folder`` keeps compiled kernels of the sources with this ``digest``."""
     versions = f"{digest} numba {version('numba')} {sys.implementation.cache_tag}"
-    events.register("numba:compile", _FirstUse(folder, versions))
+    _watching.append(_FirstUse(folder, versions))
+    events.register("numba:compile", _watching[-1])
+
+
+def is_compiling() -> bool:
+    """Whether a kernel is being compiled."""
+    return any(listener.depth > 0 for listener in _watching)
 
 
 def is_done(folder: Path, digest: str) -> bool:

@@ -1,4 +1,4 @@
-"""Arrays on disk: a folder of .npy files with manifest.json, for phase maps.
+"""Arrays on disk: a folder of .npy files with manifest.json, for phase maps and parts of results.
 
 What is stored is data only: arrays are opened without pickle, after their size, shape and blake2b digest agree with the
 manifest, whose own digest is checked first. Folders are written aside and renamed under a lock.
@@ -19,6 +19,9 @@ from creeping.storage.reading import bytes_of
 SCHEMA = 4
 MANIFEST = "manifest.json"
 _MAX_MANIFEST = 1_000_000
+TYPES = {
+    name: getattr(np, name) for name in ("float32", "float64", "complex64", "complex128", "uint8", "int64", "bool")
+}
 
 
 def write_folder(folder: str | Path, content: dict[str, Any], arrays: dict[str, FloatArray]) -> Path:
@@ -129,7 +132,7 @@ def open_array(folder: Path, name: str, content: dict[str, Any]) -> FloatArray:
     """
     path, entry = folder / name, content["files"][name]
     shape = tuple(int(n) for n in entry["shape"])
-    kind = {"float32": np.float32, "float64": np.float64, "uint8": np.uint8}[entry["type"]]
+    kind = TYPES[entry["type"]]
     try:
         # the header of a .npy file takes one or two blocks of 64 bytes; a longer file is not what was written
         extra = path.stat().st_size - np.dtype(kind).itemsize * int(np.prod(shape, dtype=object))

@@ -7,19 +7,25 @@ from the plane z = 0. The wave of a radar at (azimuth, elevation) travels the ot
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from creeping._progress import reporting
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError, SingularIncidenceError
 from creeping.field.arguments import checked, checked_across, checked_method, checked_plain
 from creeping.field.body_currents import expected_seconds
 from creeping.field.boundary import BoundaryLike
 from creeping.field.echo import Echo
+from creeping.field.equation.solving import is_rough
 from creeping.field.tmatrix.computing import pays
+from creeping.field.validity_range import is_reached
 from creeping.geodesics.direct_flow import DirectFlow
-from creeping.geometry.arguments import checked_body, real_array, real_number, shown, whole_number
+from creeping.geometry.arguments import checked_body, folder_path, real_array, real_number, shown, whole_number
 from creeping.geometry.directions import azimuth_elevation_of, directions_from_azimuth_elevation
 from creeping.geometry.parts import why_no_rays
 from creeping.geometry.piecewise import is_piecewise
@@ -27,7 +33,9 @@ from creeping.geometry.surface import Surface, size
 from creeping.phaseflow.tuning.flow_choice import choose_flow
 from creeping.rays.fan import launch
 from creeping.rays.reach import body_length
+from creeping.rays.transport import Flow
 from creeping.shadow.line import shadow_line
+from creeping.sweeping.blocks import TASK, Told, sizes_of, stored_flow, stored_sizes, sweep_blocks
 from creeping.sweeping.request import AMPLITUDES, METHODS
 from creeping.sweeping.results import SweepFields
 from creeping.sweeping.run import Progress, sweep_directions
@@ -35,8 +43,6 @@ from creeping.sweeping.run import Progress, sweep_directions
 if TYPE_CHECKING:
     import xarray
 
-TASK = 32
-"""Incidences of one task where they are many."""
 MOST = 10_000_000
 """Values of one call."""
 
@@ -51,7 +57,10 @@ def backscatter(
     method: str = "auto",
     n_rays: int = 192,
     cache: bool = True,
-    progress: Progress | None = None,
+    store: str | Path | None = None,
+    resume: bool = False,
+    rows: Told | None = None,
+    progress: Progress | bool | None = None,
 ) -> xarray.Dataset:
     """Field in the direction of the radar, for each of its angles and wavenumbers.
 
@@ -66,13 +75,19 @@ def backscatter(
     method : {"auto", "rays", "currents", "equation", "t-matrix"}
         As of `creeping.sweep_directions`: "auto" takes currents where rays leave a value unresolved and err more, and
         the integral equation of a body with edges, joints or tips, or its T-matrix where that is quicker for so many
-        angles.
+        angles: there, and where parts are more curved than rays allow.
     n_rays : int
         Rays of an incidence.
     cache : bool
         Whether a phase map is kept for the next run.
-    progress : callable, optional
-        Called as ``progress(done, total, seconds)``, as by `creeping.sweep_directions`.
+    store : path, optional
+        Folder in which values are stored as they come.
+    resume : bool
+        Go on with a store that exists.
+    rows : callable, optional
+        With a store: called now and then with the `creeping.sweeping.blocks.Rows` that are there.
+    progress : callable or bool, optional
+        True shows a bar. Or called as ``progress(done, total, seconds)``, as by `creeping.sweep_directions`.
 
     Returns
     -------
@@ -95,8 +110,8 @@ def backscatter(
     azimuths, elevations = _angles(azimuth, elevation)
     radar = directions_from_azimuth_elevation(np.radians(azimuths), np.radians(elevations))
     asked = {"boundary": boundary, "method": method, "n_rays": n_rays, "quantity": "monostatic"}
-    found = _swept(body, -radar, wavenumbers, asked, cache, progress)
-    return _with_angles(found, "incidence", azimuths, elevations)
+    named = partial(_with_angles, dimension="incidence", azimuths=azimuths, elevations=elevations)
+    return named(_swept(body, -radar, wavenumbers, asked, cache, progress, (store, resume, _told(rows, named))))
 
 
 def bistatic(
@@ -110,7 +125,10 @@ def bistatic(
     method: str = "currents",
     n_rays: int = 192,
     cache: bool = True,
-    progress: Progress | None = None,
+    store: str | Path | None = None,
+    resume: bool = False,
+    rows: Told | None = None,
+    progress: Progress | bool | None = None,
 ) -> xarray.Dataset:
     """Field towards observers around the body, for one incidence.
 
@@ -120,7 +138,7 @@ def bistatic(
         Where the radar is, as seen from the body: the wave travels in the opposite direction.
     azimuth, elevation : float or (m,), degrees
         Where the observers are, as seen from the body.
-    body, wavenumbers, boundary, method, n_rays, cache, progress
+    body, wavenumbers, boundary, method, n_rays, cache, store, resume, rows, progress
         As of `backscatter`.
 
     Returns
@@ -148,8 +166,8 @@ def bistatic(
         raise InvalidInputError(f"incidence = {shown(incidence)} is not (azimuth, elevation) in degrees") from error
     radar = directions_from_azimuth_elevation(*(float(np.radians(v[0])) for v in _angles(first, second)))
     asked = {"boundary": boundary, "method": method, "n_rays": n_rays, "quantity": "bistatic", "observation": observers}
-    found = _swept(body, -radar[None], wavenumbers, asked, cache, progress)
-    return _with_angles(found, "observer", azimuths, elevations)
+    named = partial(_with_angles, dimension="observer", azimuths=azimuths, elevations=elevations)
+    return named(_swept(body, -radar[None], wavenumbers, asked, cache, progress, (store, resume, _told(rows, named))))
 
 
 def seconds_of_currents(
@@ -182,6 +200,8 @@ def monostatic_method(body: Surface, wavenumbers: FloatArray, boundary: Boundary
     ``wavenumbers`` (k,), 1/L.
     """
     solved = why_no_rays(body) or is_piecewise(body)
+    if not solved and not is_rough(body):
+        solved = not is_reached(body, float(np.min(wavenumbers)))
     return "t-matrix" if solved and all(pays(body, k, boundary, incidences) for k in wavenumbers) else "auto"
 
 
@@ -211,7 +231,8 @@ def _swept(
     wavenumbers: ArrayLike,
     asked: dict[str, Any],
     cache: bool,
-    progress: Progress | None,
+    progress: Progress | bool | None,
+    storing: tuple[str | Path | None, bool, Told | None],
 ) -> xarray.Dataset:
     """Sweep of checked arguments."""
     if not why_no_rays(body):
@@ -231,17 +252,35 @@ def _swept(
         raise InvalidInputError(f"{count} values are asked for at once; {MOST} are the most: give a coarser step")
     if asked["method"] == "auto" and asked["quantity"] == "monostatic":
         asked["method"] = monostatic_method(body, k, asked["boundary"], len(incidences))
-    if why_no_rays(body) or asked["method"] == "t-matrix":
-        return sweep_directions(body, incidences, wavenumbers=k, progress=progress, **asked)
-    length = body_length(body, float(k.min()))
-    flow = choose_flow(body, n_rays=2 * asked["n_rays"] * len(incidences), length=length, cache=cache)
-    # small enough that progress is told in time, large enough that a task is not all overhead
-    options: dict[str, Any] = {
-        "chunk": TASK,
-        "progress": progress,
-        "length": length,
-    }
-    return sweep_directions(flow, incidences, wavenumbers=k, **options, **asked)
+    store, resume, rows = storing
+    # before the time is spent
+    if store is not None:
+        store = folder_path(store, "store")
+        if store.exists() and any(store.rglob("zarr.json")) and not resume:
+            raise InvalidInputError(f"{store} exists; give resume=True to go on with it, or choose another store")
+    elif resume:
+        raise InvalidInputError("resume goes with store=, the folder of the results")
+    flow: Flow | Surface = body
+    options: dict[str, Any] = dict(asked)
+    if not (why_no_rays(body) or asked["method"] == "t-matrix"):
+        length = body_length(body, float(k.min()))
+        flow = (stored_flow(store, body) if store else None) or choose_flow(
+            body, n_rays=2 * asked["n_rays"] * len(incidences), length=length, cache=cache
+        )
+        # small enough that progress is told in time, large enough that a task is not all overhead
+        options |= {"chunk": TASK, "length": length}
+    with reporting(progress, "incidences") as told:
+        if store is None:
+            return sweep_directions(flow, incidences, wavenumbers=k, progress=told, **options)
+        options.pop("chunk", None)
+        sizes = stored_sizes(store) or sizes_of(flow, incidences, k, options)
+        options |= {"store": store, "resume": resume, "sizes": sizes, "rows": rows}
+        return sweep_blocks(flow, incidences, k, progress=told, **options)
+
+
+def _told(rows: Told | None, named: Callable[[xarray.Dataset], xarray.Dataset]) -> Told | None:
+    """What is told of rows, with their angles."""
+    return rows and (lambda found: rows(found._replace(dataset=named(found.dataset))))
 
 
 def _with_angles(found: xarray.Dataset, dimension: str, azimuths: FloatArray, elevations: FloatArray) -> xarray.Dataset:

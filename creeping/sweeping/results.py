@@ -144,10 +144,9 @@ def sweep_attributes(plan: SweepPlan, unit: str) -> dict[str, Any]:
     return words
 
 
-def count_attributes(status: IntArray, errors: list[tuple[int, str]], seconds: float) -> dict[str, Any]:
-    """Attributes that are known afterwards: incidences by status, errors of the first that failed, seconds."""
+def count_attributes(status: IntArray, errors: list[tuple[int, str]]) -> dict[str, Any]:
+    """Attributes that tell how far it is: incidences by status, errors of the first that failed."""
     words: dict[str, Any] = {f"incidences_{k.replace(' ', '_')}": v for k, v in count_statuses(status).items()}
-    words["seconds"] = float(round(seconds, 3))
     if errors:
         words["errors"] = "\n".join(f"incidence {row}: {text}" for row, text in errors[:SHOWN])
     return words
@@ -158,7 +157,7 @@ def count_statuses(status: IntArray) -> dict[str, int]:
     return {name: int(np.sum(status == code)) for code, name in STATUS_NAMES.items()}
 
 
-def as_dataset(plan: SweepPlan, arrays: Arrays, errors: list[tuple[int, str]], seconds: float) -> "xarray.Dataset":
+def as_dataset(plan: SweepPlan, arrays: Arrays, errors: list[tuple[int, str]]) -> "xarray.Dataset":
     """Dataset in memory.
 
     Parameters
@@ -167,14 +166,13 @@ def as_dataset(plan: SweepPlan, arrays: Arrays, errors: list[tuple[int, str]], s
     arrays : dict of arrays
         Of `SweepRequest.variables`, the first axis the incidence.
     errors : list of (incidence, message)
-    seconds : float
     """
     request, unit = plan.request, unit_of(plan.body)
     variables = {
         name: (("incidence", *variable.dims), arrays[name], variable_attributes(request, name, unit))
         for name, variable in request.variables.items()
     }
-    counts = count_attributes(arrays["incidence_status"], errors, seconds)
+    counts = count_attributes(arrays["incidence_status"], errors)
     words = sweep_attributes(plan, unit) | counts
     found: xarray.Dataset = register().Dataset(variables, coordinates(request, plan.incidences, unit), words)
     return found

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
 
+from creeping._progress import reporting
 from creeping._typing import Any, ArrayLike, IntArray
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.boundary import BoundaryLike
@@ -64,7 +65,7 @@ def sweep_directions(
     resume: bool = False,
     client: Any = None,
     chunk: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> xarray.Dataset:
     """Creeping rays, or their field, for many directions of incidence.
 
@@ -111,9 +112,10 @@ def sweep_directions(
         Dask cluster, or the address of its scheduler, that shares the tasks; it needs a store that all workers see.
     chunk : int, optional
         Incidences of one task; a store that exists keeps its own.
-    progress : callable, optional
-        Called as ``progress(done, total, seconds)`` with incidences after each task, and where fields take long between
-        its frequencies too, about once a second: ``done`` has a fraction then.
+    progress : callable or bool, optional
+        True shows a bar, on a terminal and in a notebook. Or called as ``progress(done, total, seconds)`` with
+        incidences after each task, and where fields take long between its frequencies too, about once a second:
+        ``done`` has a fraction then.
 
     Returns
     -------
@@ -174,10 +176,11 @@ def sweep_directions(
     )
     patches = in_patches(request, unit)
     plan = SweepPlan(flow, request, unit[patches], chunk)
-    if store is None:
-        return in_memory(plan, progress, patches)
-    opened = open_store(plan, store, resume=resume)
-    fill(plan, opened, client=client, progress=progress)
+    with reporting(progress, "incidences") as told:
+        if store is None:
+            return in_memory(plan, told, patches)
+        opened = open_store(plan, store, resume=resume)
+        fill(plan, opened, client=client, progress=told)
     return opened.dataset().isel(incidence=np.argsort(patches))
 
 
@@ -206,7 +209,7 @@ def in_memory(plan: SweepPlan, progress: Progress | None = None, order: IntArray
     for task in range(plan.tasks):
         rows = plan.rows(task)
         if progress and isinstance(sweeper, Sweeper | SolvedSweeper | TMatrixSweeper):
-            sweeper.passed = _within(rows, count, started, progress)
+            sweeper.passed = _within(rows.start, rows, count, started, progress)
         found, failed = compute(sweeper, plan.incidences[rows])
         for name, values in arrays.items():
             values[order[rows]] = found[name]
@@ -216,19 +219,19 @@ def in_memory(plan: SweepPlan, progress: Progress | None = None, order: IntArray
             progress(rows.stop, count, time.perf_counter() - started)
     incidences = np.empty_like(plan.incidences)
     incidences[order] = plan.incidences
-    return as_dataset(replace(plan, incidences=incidences), arrays, errors, time.perf_counter() - started)
+    return as_dataset(replace(plan, incidences=incidences), arrays, errors)
 
 
-def _within(rows: slice, count: int, started: float, progress: Progress) -> Passed:
-    """What tells the progress within a task, but for its end."""
+def _within(done: float, rows: slice, count: int, started: float, progress: Progress | None) -> Passed:
+    """What tells the progress within a task, but for its end; so many incidences were done before."""
     last = time.perf_counter()
 
     def passed(share: float) -> None:
         nonlocal last
         now = time.perf_counter()
-        if share < 1 and now - last >= EVERY:
+        if progress and share < 1 and now - last >= EVERY:
             last = now
-            progress(rows.start + share * (rows.stop - rows.start), count, now - started)
+            progress(done + share * (rows.stop - rows.start), count, now - started)
 
     return passed
 
@@ -295,6 +298,9 @@ def fill(
         missing = store.missing()
         done = len(plan.incidences) - sum(plan.rows(t).stop - plan.rows(t).start for t in missing)
 
+        def within(task: int) -> Passed:
+            return _within(done, plan.rows(task), len(plan.incidences), started, progress)
+
         def report(task: int) -> None:
             nonlocal done
             done += plan.rows(task).stop - plan.rows(task).start
@@ -304,7 +310,7 @@ def fill(
         left = len(missing)
         try:
             if client is None:
-                for task in _here(plan, store, missing[:most], stop):
+                for task in _here(plan, store, missing[:most], stop, within):
                     left -= 1
                     report(task)
             elif missing:
@@ -317,19 +323,29 @@ def fill(
         except BaseException:
             # the first error is the one to tell
             with suppress(CreepingError):
-                store.finish(time.perf_counter() - started)
+                store.finish()
             raise
-        store.finish(time.perf_counter() - started)
+        store.finish()
     return left == 0
 
 
-def _here(plan: SweepPlan, store: SweepStore, tasks: list[int], stop: Callable[[], bool]) -> Any:
+def _here(
+    plan: SweepPlan,
+    store: SweepStore,
+    tasks: list[int],
+    stop: Callable[[], bool],
+    within: Callable[[int], Passed],
+) -> Any:
     """Compute tasks one after the other; yields each when it is committed."""
     sweeper = plan.make(plan.flow, plan.request) if tasks else None
+    if isinstance(sweeper, TMatrixSweeper):
+        sweeper.store = store.matrices
     status, guard = store.status(), FirstTaskGuard()
     for task in tasks:
         if stop() or sweeper is None:
             return
+        if isinstance(sweeper, Sweeper | SolvedSweeper | TMatrixSweeper):
+            sweeper.passed = within(task)
         arrays, errors = compute(sweeper, plan.incidences[plan.rows(task)])
         store.write_task(task, arrays, errors)
         store.commit(task, failures=bool(errors))
@@ -345,8 +361,8 @@ def _checked_options(store: Any, progress: Any, resume: Any) -> None:
     flag(resume, "resume")
     if store is not None:
         folder_path(store, "store")
-    if progress is not None and not callable(progress):
-        raise InvalidInputError(f"progress = {shown(progress)} cannot be called; give a function of three numbers")
+    if not (progress is None or isinstance(progress, bool) or callable(progress)):
+        raise InvalidInputError(f"progress = {shown(progress)} cannot be called; give True or a function of 3 numbers")
 
 
 def _refuse(flow: Flow, quantity: str, store: Any, resume: bool, client: Any) -> None:

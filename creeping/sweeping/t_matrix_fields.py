@@ -4,6 +4,7 @@ A matrix is kept with the body, as far as a share of the memory holds it, so tha
 """
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
@@ -33,11 +34,17 @@ class TMatrixSweeper:
         Only its body is asked.
     request : SweepRequest
         Of a field.
+
+    Attributes
+    ----------
+    store : Path, optional
+        Where the matrices are kept.
     """
 
     def __init__(self, flow: Flow, request: SweepRequest) -> None:
         self.flow, self.request = flow, request
         self.passed: Callable[[float], None] = lambda _: None
+        self.store: Path | None = None
 
     def __call__(self, incidences: FloatArray) -> dict[str, np.ndarray[Any, Any]]:
         """Arrays of results of unit directions (n, 3), the first axis the incidence.
@@ -53,7 +60,7 @@ class TMatrixSweeper:
         bistatic, done = request.quantity == "bistatic", 0
         for k, wavenumber in enumerate(request.wavenumbers):
             for name, which, suffix in request.problems:
-                T = kept_t_matrix(self.flow.body, wavenumber, parse_boundary(name))
+                T = kept_t_matrix(self.flow.body, wavenumber, parse_boundary(name), self.store)
                 found = T.far_fields(d, np.array(request.observation)) if bistatic else [T.backscatter(d)]
                 for row, far in enumerate(found):
                     rows: Any = slice(row, row + 1) if bistatic else slice(None)
@@ -69,12 +76,12 @@ class TMatrixSweeper:
         return out
 
 
-def kept_t_matrix(body: Surface, wavenumber: float, boundary: BoundaryLike) -> TMatrix:
+def kept_t_matrix(body: Surface, wavenumber: float, boundary: BoundaryLike, store: Path | None = None) -> TMatrix:
     """The T-matrix of a body, made once while there is room for it."""
     known: dict[Any, TMatrix] = memo(body, "T-matrices", dict)
     key = wavenumber, boundary
     if key not in known:
-        made = t_matrix(body, wavenumber=wavenumber, boundary=boundary)
+        made = t_matrix(body, wavenumber=wavenumber, boundary=boundary, store=store)
         while known and sum(one.matrix.nbytes for one in (made, *known.values())) > SHARE * budget():
             known.pop(next(iter(known)))
         known[key] = made

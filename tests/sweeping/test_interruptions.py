@@ -14,6 +14,7 @@ import fake_sweeps as fake
 import numpy as np
 import pytest
 
+from creeping._progress import Progress
 from creeping.commands import sweep as _sweep_command
 from creeping.sweeping.run import fill, open_store
 from creeping.sweeping.storage.store import SweepStore
@@ -117,7 +118,7 @@ def test_one_interrupt_ends_the_command_with_4_and_tells_how_to_go_on(tmp_path):
 
 
 def test_interrupts_are_counted(interruptible):
-    meter = _sweep_command._Meter(quiet=True)
+    meter = Progress(quiet=True)
     before = signal.getsignal(signal.SIGINT)
     with _sweep_command._stopping(meter) as asked:
         assert not asked.is_set()

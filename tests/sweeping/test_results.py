@@ -28,7 +28,7 @@ def blank(quantity):
     """Dataset without results, but with all that stands around them."""
     directions = cr.fibonacci_directions(6)
     plan = SweepPlan(fake.FLOW, REQUESTS[quantity], directions, 6, text="[study]\n")
-    return dataset.as_dataset(plan, plan.request.empty(6), [(3, "overflow"), (5, "")], 1.5)
+    return dataset.as_dataset(plan, plan.request.empty(6), [(3, "overflow"), (5, "")])
 
 
 @pytest.mark.parametrize("quantity", REQUESTS)

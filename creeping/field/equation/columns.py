@@ -12,16 +12,19 @@ Sources: [SS86]; [E21]; Derivations, F35 and F36.
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from creeping._progress import say
 from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import Boundary
 from creeping.field.equation.matrix import Matrix, Places
 from creeping.field.equation.split_sums import CURL, ONE_LAYER, TWO_LAYERS, SmoothKernel, SplitSums, best_split
 from creeping.storage.memory import budget
+from creeping.storage.parts import Arrays, Keeping, not_kept
 
 TOGETHER = 2e8
 """Bytes of what GMRES keeps of right sides that are solved together."""
@@ -56,15 +59,17 @@ def solved_columns(
     matrix: Matrix,
     right: ComplexArray,
     under: ComplexArray,
-    tell: Callable[[str], None] = lambda words: None,
+    tell: Callable[[str], None] = say,
+    keep: Keeping = not_kept,
     *,
     start: ComplexArray | None = None,
     steps: int = STEPS,
 ) -> Columns:
     """Solve for right sides at the nodes (n, ...), and at the points beneath them (s, ...): of a conductor (n, 2, ...).
 
-    ``tell`` hears of each part of them that is begun. ``start`` (n, m) is the share of the right sides at the nodes,
-    m of them or m times some, that the currents are about; these have COARSE_TOLERANCE and no more than ``steps``.
+    ``tell`` hears of each part of them that is begun; ``keep`` has those that are done. ``start`` (n, m) is the share
+    of the right sides at the nodes, m of them or m times some, that the currents are about; these have
+    COARSE_TOLERANCE and no more than ``steps``.
     """
     nodes, c = len(matrix.root), matrix.columns
     right = right.reshape(nodes, c, -1).astype(complex)
@@ -74,23 +79,30 @@ def solved_columns(
         first_guess, tolerance = (right * share * matrix.root[:, None, None]).reshape(nodes * c, -1), COARSE_TOLERANCE
     right[matrix.at] -= 1j * under.reshape(len(matrix.at), *right.shape[1:])
     right = (right * matrix.root[:, None, None]).reshape(nodes * c, -1)
-    product = matrix.product if is_dense(nodes, matrix.boundary) else SplitProduct(matrix)
+    products: list[Callable[[ComplexArray], ComplexArray]] = []
     n, columns = right.shape
     many = max(1, min(columns, int(TOGETHER / (16 * n * (steps + 1)))))
-    values, change, left = np.zeros_like(right), np.empty_like(right), np.empty(columns)
+    values, change, left = np.empty_like(right), np.empty_like(right), np.empty(columns)
     taken = 0
-    for first in range(0, columns, many):
-        if first:
-            tell(f"right side {first} of {columns}")
-        at = slice(first, first + many)
-        rest = right[:, at]
+
+    def solved(at: slice) -> Arrays:
+        if not products:
+            products.append(matrix.product if is_dense(nodes, matrix.boundary) else SplitProduct(matrix))
+        if at.start:
+            tell(f"right side {at.start} of {columns}")
+        begun, rest = np.zeros((n, 1), dtype=complex), right[:, at]
         if first_guess is not None:
-            values[:, at] = first_guess[:, at]
-            rest = rest - product(values[:, at])
-        size = np.linalg.norm(right[:, at], axis=0)
-        found = block_gmres(product, rest, tolerance, steps, size=size)
-        values[:, at] += found.values
-        change[:, at], left[at], taken = found.change, found.left, max(taken, found.steps)
+            begun = first_guess[:, at]
+            rest = rest - products[0](begun)
+        found = block_gmres(products[0], rest, tolerance, steps, size=np.linalg.norm(right[:, at], axis=0))
+        known = {"values": begun + found.values, "change": found.change}
+        return {**known, "left": found.left, "steps": np.array([found.steps])}
+
+    for first in range(0, columns, many):
+        at = slice(first, first + many)
+        part = keep(f"columns-{n}-{steps}-{first}", partial(solved, at))
+        values[:, at], change[:, at], left[at] = part["values"], part["change"], part["left"]
+        taken = max(taken, int(part["steps"][0]))
     # fields at points make rows of their own
     matrix.__dict__.pop("whole", None)
     back = matrix.root[:, None, None]

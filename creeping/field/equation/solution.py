@@ -34,6 +34,7 @@ from creeping.geometry.checks import unit_of
 from creeping.geometry.parts import inside as inside_of
 from creeping.geometry.surface import Surface, size
 from creeping.shadow.attachment import is_lit
+from creeping.storage.parts import Keeping, not_kept
 
 TOUCHING = 1e-6
 """Distance from the body, in its sizes, up to which a point is on it."""
@@ -77,6 +78,7 @@ class Solution:
         tiles: Tiles,
         tell: Callable[[str], None],
         effort: Effort = FULL,
+        keep: Keeping = not_kept,
     ) -> None:
         self.body, self.directions, self.wavenumber, self.boundary = body, directions, wavenumber, boundary
         self._kind, self._matrix = kind, Matrix(tiles, wavenumber, kind)
@@ -87,7 +89,7 @@ class Solution:
             twice_incident(kind, places, directions, wavenumber, magnetic) for places in (matrix.nodes, matrix.inner)
         )
         start = self._optics() if effort.coarse else None
-        found = solved_columns(matrix, right, under, tell, start=start, steps=effort.steps)
+        found = solved_columns(matrix, right, under, tell, keep, start=start, steps=effort.steps)
         self.steps, self.left = found.steps, found.left
         both = np.stack([found.values, found.change])
         if matrix.vector:

@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from creeping._progress import say, telling
 from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import checked, checked_plain
@@ -33,6 +34,7 @@ from creeping.geometry.directions import unit_directions
 from creeping.geometry.memo import memo
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface
+from creeping.storage.parts import Keeping, not_kept
 
 KEPT = 6
 """Solutions kept with a body."""
@@ -49,7 +51,7 @@ def solve(
     wavenumber: float,
     boundary: BoundaryLike,
     seconds: float = SECONDS,
-    progress: Callable[[str], None] | None = None,
+    progress: Callable[[str], None] | bool | None = None,
 ) -> Solution:
     """The field that a body scatters, by its integral equation: no shadow line and no rays are needed.
 
@@ -64,8 +66,8 @@ def solve(
     seconds : float
         What it may take, about, with all cores. Where fine tiles take more, coarse ones serve and as many steps of
         GMRES as there is time for, with a larger error; what takes more still is refused before it starts.
-    progress : callable, optional
-        Is told in words what is done, with the number of nodes, the time and the memory that it takes.
+    progress : callable or bool, optional
+        Is told in words what is done, with the number of nodes, the time and the memory that it takes; True shows it.
 
     Returns
     -------
@@ -100,9 +102,9 @@ def solve(
             "give seconds=, fewer incidences, a lower wavenumber, more memory (CREEPING_MEMORY), or let rays serve "
             "(creeping.far_field)"
         )
-    tell = progress or (lambda words: None)
-    tell(f"{told}: integrals between the nodes")
-    return _solved(body, d, k, boundary, plan.effort, tell)
+    with telling(progress) as tell:
+        tell(f"{told}: integrals between the nodes")
+        return _solved(body, d, k, boundary, plan.effort, tell)
 
 
 def _solved(
@@ -111,11 +113,12 @@ def _solved(
     wavenumber: float,
     boundary: BoundaryLike,
     effort: Effort,
-    tell: Callable[[str], None] = lambda words: None,
+    tell: Callable[[str], None] = say,
+    keep: Keeping = not_kept,
 ) -> Solution:
     kind = equation_boundary(boundary)
     tiles = body_tiles(body, wavenumber, kind, coarse=effort.coarse)
-    return Solution(body, directions, wavenumber, boundary, kind, tiles, tell, effort)
+    return Solution(body, directions, wavenumber, boundary, kind, tiles, tell, effort, keep)
 
 
 class Solved(NamedTuple):
@@ -132,7 +135,7 @@ class Solved(NamedTuple):
 
 def solution_for(body: Surface, direction: FloatArray, wavenumber: float, boundary: BoundaryLike) -> Solved | None:
     """The solution of an incidence, if the equation of the body costs less than SECONDS and resolves it, else None."""
-    if _is_rough(body):
+    if is_rough(body):
         return None
     found = _found(body, direction, wavenumber, boundary)
     if found is None:
@@ -183,11 +186,12 @@ def solved_alone(
     boundary: BoundaryLike,
     *,
     fine: bool = False,
-    tell: Callable[[str], None] = lambda words: None,
+    tell: Callable[[str], None] = say,
+    keep: Keeping = not_kept,
 ) -> Solution:
     """The solution for unit directions (m, 3) of a body that nothing else serves, within ASKED for one of them.
 
-    As it is within SECONDS where it can be, unless fine tiles are asked for.
+    As it is within SECONDS where it can be, unless fine tiles are asked for; ``keep`` has columns as they are solved.
 
     Raises
     ------
@@ -204,10 +208,10 @@ def solved_alone(
             "frequency, or a coarser mesh"
         )
     tell(f"{plan.nodes} nodes, about {plan.seconds:.2g} s and {plan.memory / 1e9:.2g} GB: integrals between the nodes")
-    return _solved(body, directions, wavenumber, boundary, plan.effort, tell)
+    return _solved(body, directions, wavenumber, boundary, plan.effort, tell, keep)
 
 
-def _is_rough(body: Surface) -> bool:
+def is_rough(body: Surface) -> bool:
     """Whether a body says of itself that it is somewhere not smooth enough for rays: what it is there is not known."""
     rough = getattr(body, "non_smooth", None)
     if rough is None or is_piecewise(body):

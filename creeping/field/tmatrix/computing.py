@@ -17,11 +17,14 @@ Sources: [W71]; [MTL02, sec. 5.8]; Derivations, F36.
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from creeping._typing import ArrayLike, FloatArray
+from creeping._progress import telling
+from creeping._typing import ArrayLike, ComplexArray, FloatArray
+from creeping._version import __version__
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, boundary_name, scalar_boundaries
@@ -33,11 +36,13 @@ from creeping.field.tmatrix.mirrors import mirrors_of, no_mirrors
 from creeping.field.tmatrix.result import TMatrix
 from creeping.field.tmatrix.solved_waves import SolvedWaves
 from creeping.field.tmatrix.spherical_waves import count, vector_count
-from creeping.geometry.arguments import real_array, shown, whole_number
+from creeping.geometry.arguments import folder_path, real_array, shown, whole_number
 from creeping.geometry.checks import unit_of
-from creeping.geometry.surface import Surface
+from creeping.geometry.memo import memo
+from creeping.geometry.surface import Surface, fingerprint
 from creeping.kernels.threads import thread_count
 from creeping.storage.memory import budget, within_budget
+from creeping.storage.parts import Arrays, Keeping, Parts, not_kept
 
 SECONDS = 300.0
 """What it may take, unless the caller says."""
@@ -50,6 +55,8 @@ LEAST = 3
 """Degrees at least."""
 RATE, PER_SUM = 3e10, 4e-9
 """Single-precision operations that LAPACK does in a second on a core, and seconds of a sum over images, about."""
+RESULT = "matrix"
+"""Part of a store that is left at the end."""
 DENSE = 0.7
 """Share of the memory that the factors and the waves at the nodes may take."""
 
@@ -62,7 +69,8 @@ def t_matrix(
     center: ArrayLike | None = None,
     order: int | None = None,
     seconds: float = SECONDS,
-    progress: Callable[[str], None] | None = None,
+    store: str | Path | None = None,
+    progress: Callable[[str], None] | bool | None = None,
 ) -> TMatrix:
     """What a body scatters of every incident wave at once, by its integral equation.
 
@@ -78,8 +86,12 @@ def t_matrix(
         Highest degree of the waves; by default far fields err by less than 1e-4 of the largest for want of higher ones.
     seconds : float
         What it may take, about, with all cores; more is refused before it starts.
-    progress : callable, optional
-        Is told in words what is done, with the number of nodes, the time and the memory that it takes.
+    store : path, optional
+        Folder in which solved columns are stored as they come, and the matrix at the end: a call that was ended goes on
+        there, and one that has been made before is answered from there. Matrices of many wavenumbers, boundaries and
+        bodies may share it, and several processes may fill it, e.g. one for each frequency.
+    progress : callable or bool, optional
+        Is told in words what is done, with the number of nodes, the time and the memory that it takes; True shows it.
 
     Returns
     -------
@@ -88,7 +100,8 @@ def t_matrix(
     Raises
     ------
     InvalidInputError
-        On bad arguments, for a weighted body, and if it would take more time or memory than it may.
+        On bad arguments, for a weighted body, if it would take more time or memory than it may, and if the boundary
+        varies and there is a store, which could not know it again.
     SurfaceError
         If the body has no mesh.
 
@@ -106,12 +119,54 @@ def t_matrix(
     checked_plain(body)
     kinds = scalar_boundaries(boundary)
     k = checked(wavenumber, 2, body)
-    tell = progress or (lambda words: None)
     kind = CONDUCTOR if len(kinds) == 2 else kinds[0]
-    tiles = body_tiles(body, FINER * k, kind)
     middle = _center(body, center)
+    highest = None if order is None else whole_number(order, "order")
+
+    def made(T: ComplexArray, extinction: float) -> TMatrix:
+        return TMatrix(
+            matrix=T,
+            wavenumber=k,
+            center=middle,
+            boundary=boundary_name(boundary),
+            vector=kind.kind == "conductor",
+            body=" ".join(repr(body).split()),
+            extinction=extinction,
+            absorbing=kind.kind == "impedance",
+            unit=unit_of(body),
+        )
+
+    with telling(progress) as tell:
+        if store is None:
+            return made(*_computed(body, k, kind, middle, highest, seconds, tell, not_kept))
+        if kinds[0].varies:
+            raise InvalidInputError("a boundary that varies cannot be told from others in a store; leave out store=")
+        key = {"body": fingerprint(body), "wavenumber": k, "boundary": boundary_name(boundary), "order": highest}
+        parts = Parts(folder_path(store, "store"), key | {"center": middle.tolist(), "version": __version__})
+
+        def whole() -> Arrays:
+            T, extinction = _computed(body, k, kind, middle, highest, seconds, tell, parts)
+            return {"matrix": T, "extinction": np.array([extinction])}
+
+        found = parts(RESULT, whole)
+        parts.forget(but=RESULT)
+        return made(np.array(found["matrix"]), float(found["extinction"][0]))
+
+
+def _computed(
+    body: Surface,
+    k: float,
+    kind: Boundary,
+    middle: FloatArray,
+    order: int | None,
+    seconds: float,
+    tell: Callable[[str], None],
+    keep: Keeping,
+) -> tuple[ComplexArray, float]:
+    """The matrix, and what is left of plane waves inside the body."""
+    tiles = body_tiles(body, FINER * k, kind)
     radius = float(np.max(np.linalg.norm(tiles.points - middle, axis=1)))
-    degree = order_for(k * radius) if order is None else whole_number(order, "order")
+    degree = order_for(k * radius) if order is None else order
     matrix = Matrix(tiles, k, kind)
     mirrors = mirrors_of(matrix, middle)
     plan = plan_for(load_on(tiles, FINER * k, kind), kind, degree, len(mirrors.images))
@@ -123,20 +178,12 @@ def t_matrix(
             "or a lower wavenumber; creeping.solve and rays serve for few incidences"
         )
     tell(f"{what}: about {plan.seconds:.2g} s and {plan.memory / 1e9:.2g} GB")
-    planes = mirrors if plan.direct else no_mirrors(matrix)
-    solved = SolvedWaves(matrix, middle, degree, planes, tell, direct=plan.direct)
+    # what it was begun with, whatever memory is free now
+    direct = bool(keep("plan", lambda: {"direct": np.array([plan.direct])})["direct"][0])
+    planes = mirrors if direct else no_mirrors(matrix)
+    solved = SolvedWaves(matrix, middle, degree, planes, tell, direct=direct, keep=keep)
     tell("what is left inside")
-    return TMatrix(
-        matrix=solved.T,
-        wavenumber=k,
-        center=middle,
-        boundary=boundary_name(boundary),
-        vector=kind.kind == "conductor",
-        body=" ".join(repr(body).split()),
-        extinction=solved.extinction(inside_points(body, tiles, 2 * np.pi / k)),
-        absorbing=kind.kind == "impedance",
-        unit=unit_of(body),
-    )
+    return solved.T, solved.extinction(inside_points(body, tiles, 2 * np.pi / k))
 
 
 def order_for(size: float, digits: float = DIGITS) -> int:
@@ -179,7 +226,16 @@ def expected(body: Surface, wavenumber: float, boundary: BoundaryLike) -> Plan:
     kinds = scalar_boundaries(boundary)
     kind = CONDUCTOR if len(kinds) == 2 else kinds[0]
     radius = 0.5 * float(np.linalg.norm(np.ptp(np.asarray(body.bounds, dtype=float), axis=0)))
-    return plan_for(load_of(body, FINER * wavenumber, kind), kind, order_for(wavenumber * radius))
+
+    def parts() -> int:
+        matrix = Matrix(body_tiles(body, FINER * wavenumber, kind), wavenumber, kind)
+        return len(mirrors_of(matrix, _center(body, None)).images)
+
+    # as many at every wavenumber
+    images = (
+        1 if kind.varies else memo(body, f"images of a {'vector' if kind.kind == 'conductor' else 'scalar'}", parts)
+    )
+    return plan_for(load_of(body, FINER * wavenumber, kind), kind, order_for(wavenumber * radius), images)
 
 
 def pays(body: Surface, wavenumber: float, boundary: BoundaryLike, incidences: int) -> bool:

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from creeping._typing import ComplexArray, FloatArray
+from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.field.tmatrix.patterns import degrees_of, received
 from creeping.geometry.directions import fibonacci_directions
 
@@ -27,6 +27,21 @@ LEAST = 2e-5
 """Error of f over its rms at least: integrals over tiles are no better."""
 TABLE, SPREAD = 4000, 4
 """Directions beyond which what T lacks there is read off a table, and places of it for each wave."""
+
+
+def uncoupled(T: ComplexArray) -> list[IntArray]:
+    """Waves in sets that a T-matrix does not couple, as of a body with planes of symmetry; all in one else.
+
+    Examples
+    --------
+    >>> [at.tolist() for at in uncoupled(np.array([[1j, 0, 2], [0, 1, 0], [2, 0, 0]]))]
+    [[0, 2], [1]]
+    """
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    number, which = connected_components(csr_array(T != 0), directed=False)
+    return [np.flatnonzero(which == one) for one in range(number)]
 
 
 class Lack:
@@ -66,9 +81,11 @@ class Lack:
         """Norm of S*S - 1 over that of S - 1."""
         if self._absorbing:
             return float("nan")
-        T = self._T
-        lacks = T + T.conj().T + 2 * T.conj().T @ T
-        return float(np.linalg.norm(lacks)) / self._size if self._size else 0.0
+        found = 0.0
+        for at in uncoupled(self._T):
+            T = self._T[np.ix_(at, at)]
+            found = np.hypot(found, np.linalg.norm(T + T.conj().T + 2 * T.conj().T @ T))
+        return float(found) / self._size if self._size else 0.0
 
     @property
     def known(self) -> float:

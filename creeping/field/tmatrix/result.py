@@ -241,16 +241,20 @@ class TMatrix:
     def backscatter(self, directions: ArrayLike) -> FarField:
         """Far field of each incidence (m, 3) back to where it comes from, in directions -d.
 
-        It is a Fourier series in both angles: of very many directions each costs little.
+        Of many directions it is a Fourier series in both angles, made once, after which each costs little.
         """
         d = unit_directions(directions, "directions of incidence").reshape(-1, 3)
+        error = self._lack.backward_error(d)
+        # the series takes as many products with the matrix
+        if len(d) <= 2 * self.order:
+            values = self.bistatic(d, -d, pairs=True).values
+            return self._far(-d, values, np.broadcast_to(error.reshape(-1, *[1] * (values.ndim - 1)), values.shape))
         theta, phi = angles_of(d)
         found = self._backward.at(theta, phi)
         if self.vector:
             # at the poles phi is 0 both of d and of -d, by convention: theta and phi of -d turn about
             found[np.hypot(d[:, 0], d[:, 1]) < 1e-12] *= -1
         found = found * np.exp(2j * self.wavenumber * (d @ self.center))[:, None, None]
-        error = self._lack.backward_error(d)
         error = np.broadcast_to(error[:, None, None], found.shape).copy()
         return self._far(-d, *((found, error) if self.vector else (found[:, 0, 0], error[:, 0, 0])))
 

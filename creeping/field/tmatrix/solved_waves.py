@@ -10,6 +10,7 @@ Sources: [W71]; [MTL02, sec. 5.8]; Derivations, F36.
 """
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from creeping.field.equation.columns import solved_columns
 from creeping.field.equation.matrix import BLOCK, Matrix, Places
 from creeping.field.tmatrix.mirrors import Mirrors, parities
 from creeping.field.tmatrix.spherical_waves import combined, count, gradients, regular, vector_parts
+from creeping.storage.parts import Arrays, Keeping, not_kept
 
 COLUMNS = 512
 """Right sides that are solved together: between them an interrupt is heard."""
@@ -56,8 +58,9 @@ class SolvedWaves:
         tell: Callable[[str], None],
         *,
         direct: bool,
+        keep: Keeping = not_kept,
     ) -> None:
-        self._of, self._center, self._order, self._mirrors = matrix, center, order, mirrors
+        self._of, self._center, self._order, self._mirrors, self._keep = matrix, center, order, mirrors, keep
         self._sums, which = parities(order, self._mirrors.axes, vector=matrix.vector)
         c, part, signs, images = matrix.columns, self._mirrors.part, self._mirrors.signs, self._mirrors.images
         under = np.full(len(matrix.root), -1)
@@ -72,11 +75,14 @@ class SolvedWaves:
         self._values: Any = np.empty((c * len(matrix.root), len(size)), dtype=np.complex64)
         rows = (c * images[:, :, None] + np.arange(c)).reshape(len(images), -1)
         parts = [np.flatnonzero(which == number) for number in range(len(images))]
+        # columns of values stand by parity
+        self._columns, first = np.concatenate(parts), 0
         for number, found in enumerate(self._factorised(given, parts, tell) if direct else self._iterated(given, tell)):
             at, chi = parts[number], self._mirrors.characters[number]
             T[np.ix_(at, at)] = len(chi) * size[at][:, None] * (sent[:, at].T @ found) * self._size[at]
             for image, sign in zip(rows, chi[:, None] * signs.reshape(len(chi), -1), strict=True):
-                self._values[np.ix_(image, at)] = found * sign[:, None].astype(np.float32)
+                self._values[image, first : first + len(at)] = found * sign[:, None].astype(np.float32)
+            first += len(at)
         self.T: ComplexArray = np.asarray(self._sums @ (self._sums @ T.T).T)
 
     def _waves_at(self, places: Places) -> WavesAt:
@@ -111,16 +117,27 @@ class SolvedWaves:
         B = given[0] * root
         above = (c * self._above[:, None] + np.arange(c)).ravel()
         B[above] -= 1j * given[1] * root[above]
-        blocks = self._blocks()
+        blocks: list[np.ndarray] = []
+        factors: dict[int, Any] = {}
+
+        def solved(number: int, first: int, right: np.ndarray) -> Arrays:
+            if not blocks:
+                tell("integrals between the nodes")
+                blocks.extend(self._blocks())
+            if number not in factors:
+                factors.clear()
+                tell(f"factors of block {number + 1} of {len(parts)}")
+                # rows of C are columns of Fortran
+                factors[number] = lu_factor(blocks[number].T, overwrite_a=True, check_finite=False)
+            tell(f"block {number + 1} of {len(parts)}, wave {first + 1} of {len(parts[number])}")
+            return {"values": lu_solve(factors[number], right, trans=1, check_finite=False)}
+
         for number, at in enumerate(parts):
-            tell(f"factors of block {number + 1} of {len(parts)}")
-            # rows of C are columns of Fortran
-            factors = lu_factor(blocks[number].T, overwrite_a=True, check_finite=False)
             found = np.asfortranarray(B[:, at])
             for first in range(0, len(at), COLUMNS):
-                tell(f"wave {first + 1} of {len(at)}")
                 some = slice(first, first + COLUMNS)
-                found[:, some] = lu_solve(factors, found[:, some], trans=1, check_finite=False)
+                made = partial(solved, number, first, found[:, some])
+                found[:, some] = self._keep(f"block-{number}-{first}", made)["values"]
             yield found / root
 
     def _blocks(self) -> np.ndarray:
@@ -165,7 +182,7 @@ class SolvedWaves:
         """Values at all nodes (c n, waves) by GMRES."""
         matrix, c = self._of, self._of.columns
         right, under = (part.reshape(-1, c, part.shape[1]) for part in given)
-        found = solved_columns(matrix, right, under, tell)
+        found = solved_columns(matrix, right, under, tell, self._keep)
         yield found.values.reshape(c * len(right), -1).astype(np.complex64)
 
     def extinction(self, points: FloatArray) -> float:
@@ -177,8 +194,12 @@ class SolvedWaves:
         x, z = (np.broadcast_to(row, points.shape) for row in np.eye(3)[[0, 2]])
         if not matrix.vector:
             kind, factor = ("single", -0.5) if matrix.soft else ("double", 0.5)
-            left = factor * matrix.received(Places.at(points, z), np.asarray(self._values), kind) * self._size
-            left += (self._sums.T @ table[:, : count(self._order)].T).T
+            left = (
+                factor
+                * matrix.received(Places.at(points, z), np.asarray(self._values), kind)
+                * self._size[self._columns]
+            )
+            left += (self._sums.T @ table[:, : count(self._order)].T).T[:, self._columns]
             return float(np.sqrt(4 * np.pi * np.sum(np.abs(left) ** 2) / len(points)))
         # (n x H) x n has no part along n: another n for that one
         H = np.empty((len(points), 3, self._values.shape[1]), dtype=complex)
@@ -188,9 +209,9 @@ class SolvedWaves:
             found = 0.5 * matrix.received(places, both)
             turned = places.a[:, :, None] * found[:, :1] + places.b[:, :, None] * found[:, 1:]
             H[:, axes] = np.cross(turned, normals[:, :, None], axis=1)[:, axes]
-        H *= self._size
+        H *= self._size[self._columns]
         E = np.stack([(part.T @ table.T).T for part in (p @ self._sums for p in vector_parts(self._order))], axis=1)
-        H += -1j * E.reshape(len(points), 3, -1, 2)[..., ::-1].reshape(E.shape)
+        H += -1j * E.reshape(len(points), 3, -1, 2)[..., ::-1].reshape(E.shape)[..., self._columns]
         return float(np.sqrt(2 * np.pi * np.sum(np.abs(H) ** 2) / len(points)))
 
 

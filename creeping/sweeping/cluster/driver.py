@@ -28,6 +28,7 @@ from creeping.sweeping.plan import Arrays, FirstTaskGuard, Maker, SweepPlan, com
 from creeping.sweeping.request import SweepRequest
 from creeping.sweeping.storage.layout import UNDONE
 from creeping.sweeping.storage.store import SweepStore
+from creeping.sweeping.t_matrix_fields import TMatrixSweeper
 
 AHEAD = 2
 """Tasks in flight for each thread of the workers."""
@@ -282,7 +283,10 @@ class Recipe:
                 raise CreepingError(f"the worker on {process()[0]} does not see {self.folder}; give a shared folder")
             # the driver has mended it
             store = SweepStore.open(self.folder, mending=True)
-            self.own.tools = (self.make(store.flow(self.body), self.request), store)
+            sweeper = self.make(store.flow(self.body), self.request)
+            if isinstance(sweeper, TMatrixSweeper):
+                sweeper.store = store.matrices
+            self.own.tools = (sweeper, store)
         tools: tuple[Any, SweepStore] = self.own.tools
         return tools
 

@@ -28,7 +28,14 @@ from creeping.geometry.checks import UNKNOWN
 from creeping.storage.folder import content_digest
 from creeping.storage.reading import bytes_of, opened
 from creeping.sweeping.plan import SweepPlan
-from creeping.sweeping.results import coordinates, require, sweep_attributes, variable_attributes
+from creeping.sweeping.results import (
+    MISSING,
+    coordinates,
+    count_attributes,
+    require,
+    sweep_attributes,
+    variable_attributes,
+)
 
 SCHEMA = 2
 STATUS, SUMS, ERRORS = "task_status", "task_checksums", "incidence_error"
@@ -68,7 +75,8 @@ def write_empty(folder: Path, plan: SweepPlan, unit: str) -> None:
     words = {"description": "why an incidence failed, UTF-8, zeros after it"}
     _create(group, ERRORS, (count, ERROR_BYTES), "uint8", ("incidence", "character"), words, first=plan.chunk, fill=0)
     # as xarray writes it: which arrays are coordinates
-    group.attrs.update(sealed(sweep_attributes(plan, unit) | {"coordinates": " ".join(beside)}))
+    none_yet = count_attributes(np.full(count, MISSING), [])
+    group.attrs.update(sealed(sweep_attributes(plan, unit) | none_yet | {"coordinates": " ".join(beside)}))
     study = group.create_group(STUDY)
     content = {"schema": SCHEMA, "key": plan.key, "variables": list(request.variables), "unit": unit}
     content["files"] = file_digests(folder)

@@ -213,6 +213,11 @@ class SweepStore(StoreArrays):
         finally:
             self._lock.release()
 
+    @property
+    def matrices(self) -> Path:
+        """Folder of the T-matrices that its fields are made of."""
+        return self.folder / STUDY / "t-matrices"
+
     def status(self) -> IntArray:
         """Status of the tasks (tasks,): 0 missing, 1 done, 2 done but for failed incidences."""
         with self.reading(STATUS):
@@ -299,8 +304,8 @@ class SweepStore(StoreArrays):
                     self.array("incidence_status")[self.rows(task)]
             raise
 
-    def finish(self, seconds: float) -> None:
-        """Write counts and seconds, of this run and those before it, to the attributes of the dataset."""
+    def finish(self) -> None:
+        """Write counts to the attributes of the dataset."""
         zarr = require("zarr")
         status = self.incidence_status()
         for task in np.flatnonzero(self.status() == UNDONE):
@@ -308,8 +313,7 @@ class SweepStore(StoreArrays):
         with self.writing(), self.reading(ROOT):
             group = zarr.open_group(self.folder, mode="r+", zarr_format=3)
             old = {k: v for k, v in group.attrs.items() if k != "errors"}
-            counts = count_attributes(status, self.failures(), float(old.get("seconds", 0)) + seconds)
-            group.attrs.put(sealed(old | counts))
+            group.attrs.put(sealed(old | count_attributes(status, self.failures())))
 
     def dataset(self) -> "xarray.Dataset":
         """Dataset whose values are read when they are used; a chunk that is damaged then is a `CreepingError`.
@@ -325,6 +329,21 @@ class SweepStore(StoreArrays):
         found = opened[self.variables].assign_coords(opened.coords)
         found.attrs.pop(SEAL)
         return found.assign({name: found[name].copy(data=self.lazily(name)) for name in self.variables})
+
+    def loaded(self) -> "xarray.Dataset":
+        """Dataset in memory, what is missing as its arrays are filled.
+
+        Raises
+        ------
+        CreepingError
+            As `require_whole`, and if a chunk is damaged.
+        """
+        self.require_whole()
+        with self.reading("a variable"):
+            opened: xarray.Dataset = register().open_zarr(self.folder, consolidated=False, chunks=None).load()
+        found = opened[self.variables].assign_coords(opened.coords)
+        found.attrs.pop(SEAL)
+        return found
 
     def lost(self) -> dict[int, str]:
         """Done tasks without all their chunks, and the first variable that they lack."""

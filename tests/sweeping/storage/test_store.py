@@ -34,7 +34,7 @@ def test_a_store_holds_what_memory_holds(tmp_path):
     ds, memory = store.dataset(), in_memory(plan)
     assert ds["creeping"].chunks[0] == (4, 4, 4, 4, 2)
     assert ds.attrs["incidences_ok"] == 18 and ds.attrs["incidences_missing"] == 0
-    timed = {"seconds", "study"}
+    timed = {"study"}
     assert {k: v for k, v in ds.attrs.items() if k not in timed} == {
         k: v for k, v in memory.attrs.items() if k not in timed
     }
@@ -55,7 +55,7 @@ def test_coordinates_and_units_are_those_of_memory(tmp_path, quantity):
     request = sweep_request(quantity, length=1.0, n_steps=3, **asked[quantity])
     plan = SweepPlan(METRIC, request, cr.fibonacci_directions(7), 4)
     ds = SweepStore.create(tmp_path / "s.zarr", plan).dataset()
-    memory = as_dataset(plan, request.empty(7), [], 0.0)
+    memory = as_dataset(plan, request.empty(7), [])
     assert list(ds.data_vars) == list(memory.data_vars) and set(ds.coords) == set(memory.coords)
     for name, values in memory.variables.items():
         assert ds[name].dims == values.dims and ds[name].attrs == values.attrs

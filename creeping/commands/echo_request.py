@@ -1,0 +1,217 @@
+"""What ``creeping rcs`` and ``creeping ts`` ask for: angles, frequencies, polarisations. Degrees, hertz, metres."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from creeping._typing import FloatArray
+from creeping.commands.forecast import size_words
+from creeping.commands.wave import cure_of
+from creeping.errors import InvalidInputError
+from creeping.field.boundary import boundary_name, parse_boundary
+from creeping.field.forward import lobe_step
+from creeping.field.frequency import frequency as frequency_of
+from creeping.field.frequency import is_length, wavenumber
+from creeping.geometry.surface import Surface
+from creeping.sweeping.results import POLARISATIONS
+
+AXES = {"az": "azimuth", "el": "elevation"}
+WHOLE = {"azimuth": (0.0, 360.0), "elevation": (-90.0, 90.0)}
+MOST = 200_000
+"""Angles of a cut."""
+FORMS = "az or el for a cut, az:FIRST:LAST:STEP for a part of one, az:20 or az:20,el:5 for one direction"
+
+
+@dataclass(frozen=True)
+class EchoRequest:
+    """One echo.
+
+    Attributes
+    ----------
+    quantity : {"rcs", "ts"}
+    wavenumbers : (k,), 1/m
+    sound_speed : float, m/s, optional
+    channels : tuple of str
+        Polarisations, or one boundary.
+    boundary : str
+    monostatic : bool
+    incidence : (azimuth, elevation), degrees
+        Of the radar; of a cut the angle that does not vary.
+    place : (azimuth, elevation), degrees
+        The one direction where nothing varies.
+    angle_name : str
+        "azimuth" or "elevation", or "" for one direction.
+    span : (first, last), degrees
+    step : float, degrees, optional
+        None: by the lobes.
+    cure : str
+        What to look at where the body has an absurd size in wavelengths.
+    """
+
+    quantity: str
+    wavenumbers: FloatArray
+    sound_speed: float | None
+    channels: tuple[str, ...]
+    boundary: str
+    monostatic: bool
+    incidence: tuple[float, float]
+    place: tuple[float, float]
+    angle_name: str
+    span: tuple[float, float]
+    step: float | None
+    cure: str
+
+    def angles(self, body: Surface) -> tuple[FloatArray, FloatArray]:
+        """Azimuths and elevations (n,), degrees.
+
+        Raises
+        ------
+        InvalidInputError
+            If there are too many.
+        """
+        if not self.angle_name:
+            return np.array([self.place[0]]), np.array([self.place[1]])
+        step = self.step or lobe_step(body, float(self.wavenumbers.max()), monostatic=self.monostatic)
+        count = (self.span[1] - self.span[0]) / step
+        if count > MOST:
+            raise InvalidInputError(
+                f"a cut of {count:.3g} angles is asked for; {MOST} are the most: give a coarser step, if the body is "
+                f"to be {size_words(body, self.wavenumbers, metres=True, cure=self.cure)}"
+            )
+        varied = np.asarray(self.span[0] + step * np.arange(int(count + 1e-9) + 1), dtype=float)
+        fixed: FloatArray = np.full(len(varied), self.incidence[1 if self.angle_name == "azimuth" else 0])
+        return (varied, fixed) if self.angle_name == "azimuth" else (fixed, varied)
+
+
+def echo_request(
+    quantity: str,
+    *,
+    frequency: str | None,
+    wavelength: str | None,
+    sound_speed: float | None,
+    polarisation: str | None,
+    boundary: str,
+    monostatic: str | None,
+    bistatic: str | None,
+    incidence: str | None,
+) -> EchoRequest:
+    """What the options ask for.
+
+    Raises
+    ------
+    InvalidInputError
+        Names the option that is wrong.
+    """
+    if (frequency is None) == (wavelength is None):
+        raise InvalidInputError('give --frequency, e.g. "10GHz" or "2:18:0.1GHz", or --wavelength, e.g. "3cm"')
+    if monostatic is not None and bistatic is not None:
+        raise InvalidInputError("--monostatic and --bistatic are both given; give one")
+    text, option = (frequency, "--frequency") if frequency is not None else (wavelength, "--wavelength")
+    assert text is not None
+    try:
+        if is_length(text) != (wavelength is not None):
+            raise InvalidInputError(
+                f"{text!r} is a length: --wavelength" if wavelength is None else f"{text!r}: give e.g. {text}cm"
+            )
+        numbers = np.unique(np.atleast_1d(wavenumber(text, sound_speed=sound_speed)))
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{option}: {error}") from error
+    at = (0.0, 0.0) if incidence is None else _pair("--incidence", incidence, _numbers("--incidence", incidence, 2))
+    asked = monostatic if monostatic is not None else bistatic
+    if asked is None and len(numbers) == 1 and incidence is None:
+        asked = "az"
+    option_of_angles = "--bistatic" if bistatic is not None else "--monostatic"
+    place = _place(option_of_angles, asked, at)
+    name, span, step = _cut(option_of_angles, asked if place is None else None)
+    return EchoRequest(
+        quantity=quantity,
+        wavenumbers=numbers,
+        sound_speed=sound_speed,
+        channels=_channels(polarisation, boundary),
+        boundary=boundary,
+        monostatic=bistatic is None,
+        incidence=(at[0], at[1]),
+        place=place or at,
+        angle_name=name,
+        span=span,
+        step=step,
+        cure=cure_of(option, text, float(frequency_of(numbers.max(), sound_speed=sound_speed))),
+    )
+
+
+def _channels(polarisation: str | None, boundary: str) -> tuple[str, ...]:
+    if boundary != "pec":
+        if polarisation is not None:
+            raise InvalidInputError("--polarisation is of a conductor; sound has none")
+        # as datasets name it
+        return (boundary_name(parse_boundary(boundary)),)
+    names = tuple(name.strip().upper() for name in (polarisation or "HH,VV").split(","))
+    unknown = [name for name in names if name not in POLARISATIONS]
+    if unknown or len(set(names)) < len(names):
+        raise InvalidInputError(f"--polarisation {polarisation!r}: give some of {', '.join(POLARISATIONS)}, each once")
+    return names
+
+
+def _pair(option: str, text: str, angles: Sequence[float]) -> tuple[float, float]:
+    """Azimuth and elevation, degrees, if they are such."""
+    if abs(angles[1]) > 90:
+        raise InvalidInputError(f"{option} {text!r}: elevation is not between -90 and 90 degrees")
+    return angles[0], angles[1]
+
+
+def _place(option: str, text: str | None, at: tuple[float, float]) -> tuple[float, float] | None:
+    """Azimuth and elevation of ``az:20``, ``el:5`` or ``az:20,el:5``, what is not given from ``at``; None of a cut."""
+    given = [part.split(":") for part in (text or "").split(",")]
+    if any(len(part) != 2 or part[0] not in AXES for part in given) or len({part[0] for part in given}) < len(given):
+        return None
+    named = {short: _numbers(option, angle, 1)[0] for short, angle in given}
+    return _pair(option, str(text), [named.get(short, one) for short, one in zip(AXES, at, strict=True)])
+
+
+def radians_hint(option: str, text: str | None) -> str:
+    """A question where a number has the digits of a multiple of pi/2, and two of them or more behind the point.
+
+    Examples
+    --------
+    >>> radians_hint("--incidence", "3.14,0"), radians_hint("--monostatic", "az:0:180:1.5")
+    ('--incidence 3.14,0 is in degrees; 3.14 looks like radians, for 180', '')
+    """
+    for number in re.findall(r"\d+\.\d\d+", text or ""):
+        quarters = round(float(number) / (np.pi / 2))
+        if quarters and f"{quarters * np.pi / 2:.{len(number.partition('.')[2])}f}" == number:
+            return f"{option} {text} is in degrees; {number} looks like radians, for {90 * quarters}"
+    return ""
+
+
+def _cut(option: str, text: str | None) -> tuple[str, tuple[float, float], float | None]:
+    """Name of the angle that varies, its span, and the step if it is given: of ``az`` or ``az:FIRST:LAST:STEP``."""
+    if text is None:
+        return "", (0.0, 0.0), None
+    short, _, rest = text.partition(":")
+    if short not in AXES:
+        raise InvalidInputError(f"{option} {text!r} is unknown; give {FORMS}, in degrees")
+    name = AXES[short]
+    if not rest:
+        return name, WHOLE[name], None
+    numbers = _numbers(option, rest.replace(":", ","), rest.count(":") + 1)
+    if len(numbers) != 3:
+        raise InvalidInputError(f"{option} {text!r} has {len(numbers)} numbers; give {FORMS}, in degrees")
+    first, last, step = numbers
+    if not (step > 0 and first < last):
+        raise InvalidInputError(f"{option} {text!r}: the step is not positive, or the first angle not below the last")
+    if name == "elevation" and max(abs(first), abs(last)) > 90:
+        raise InvalidInputError(f"{option} {text!r}: elevation is not between -90 and 90 degrees")
+    return name, (first, last), step
+
+
+def _numbers(option: str, text: Any, count: int) -> tuple[float, ...]:
+    try:
+        found = tuple(float(item) for item in str(text).split(","))
+    except ValueError:
+        found = ()
+    if len(found) != count or not np.all(np.isfinite(found)):
+        raise InvalidInputError(f"{option} {text!r} is not {count} number{'s' * (count > 1)}, e.g. 30,0, in degrees")
+    return found

@@ -1,0 +1,211 @@
+"""A sweep of many wavenumbers as one store for each block of them, side by side in a folder: none is lost with another.
+
+What is computed once for all incidences, an equation or a T-matrix, is a block and a task for each wavenumber. Where
+each incidence has a cost of its own, wavenumbers share its geometry, and tasks have few incidences.
+"""
+
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from creeping._progress import EVERY
+from creeping._typing import Any, BoolArray, FloatArray
+from creeping.errors import CreepingError
+from creeping.geometry.parts import why_no_rays
+from creeping.geometry.piecewise import is_piecewise
+from creeping.geometry.surface import Surface
+from creeping.rays.transport import Flow
+from creeping.shadow.status import FAILED
+from creeping.sweeping.results import MISSING, count_attributes, require
+from creeping.sweeping.run import Progress, sweep_directions
+from creeping.sweeping.storage.store import SweepStore
+
+if TYPE_CHECKING:
+    import xarray
+
+TASK = 32
+"""Values of one task: of some 0.1 s each where currents serve, so that a few seconds of work are lost at most."""
+
+SHARE = 10.0
+"""Seconds between reports of what is there, over what making the last one took."""
+
+
+class Rows(NamedTuple):
+    """A dataset in which some values are not computed yet, and which are: (incidences, wavenumbers)."""
+
+    dataset: xarray.Dataset
+    known: BoolArray
+
+
+Told = Callable[[Rows], None]
+
+
+def stored_flow(store: str | Path, body: Surface) -> Flow | None:
+    """Flow that a folder of blocks was begun with; None where none of them has begun."""
+    first = Path(store) / _name(0)
+    return SweepStore.open(first, mending=True).flow(body) if first.exists() else None
+
+
+def stored_sizes(store: str | Path) -> tuple[int, int] | None:
+    """See `sizes_of`: those that a folder of blocks was begun with."""
+    first = Path(store) / _name(0)
+    if not first.exists():
+        return None
+    found = SweepStore.open(first, mending=True)
+    return len(found.key["request"]["wavenumbers"]), found.chunk
+
+
+def sweep_blocks(
+    flow: Flow | Surface,
+    incidences: FloatArray,
+    wavenumbers: FloatArray,
+    *,
+    store: str | Path,
+    resume: bool,
+    sizes: tuple[int, int],
+    progress: Progress | None = None,
+    rows: Told | None = None,
+    **asked: Any,
+) -> xarray.Dataset:
+    """Dataset of `creeping.sweep_directions` for incidences (n, 3) and wavenumbers (k,), in memory when all is there.
+
+    Parameters
+    ----------
+    flow, incidences, wavenumbers, asked
+        As of `creeping.sweep_directions`.
+    store : path
+        Folder of the blocks.
+    resume : bool
+        Go on with those that are there.
+    sizes : (int, int)
+        Wavenumbers of a block, and incidences of a task; see `sizes_of`.
+    progress : callable, optional
+        As of `creeping.sweep_directions`.
+    rows : callable, optional
+        Called with `Rows` after a task now and then, and when the sweep is interrupted.
+
+    Raises
+    ------
+    CreepingError
+        As by `creeping.sweep_directions`.
+    """
+    count, all_k = len(incidences), len(wavenumbers)
+    each, chunk = sizes
+    blocks = [wavenumbers[first : first + each] for first in range(0, all_k, each)]
+    started = time.perf_counter()
+    done: list[xarray.Dataset] = []
+    place = Path(store) / _name(0)
+
+    shown, took = started, 0.0
+
+    def show(last: bool = False) -> None:
+        nonlocal shown, took
+        begun = time.perf_counter()
+        if rows is None or not (last or begun - shown >= max(EVERY, SHARE * took)):
+            return
+        if (found := _so_far(done, place, blocks)) is not None:
+            rows(found)
+        shown = time.perf_counter()
+        took = shown - begun
+
+    def told(share: float, _: int, __: float) -> None:
+        before = sum(map(len, blocks[: len(done)]))
+        if progress is not None:
+            part = (before * count + share * len(blocks[len(done)])) / all_k
+            progress(part, count, time.perf_counter() - started)
+        # tasks that are done are counted in whole incidences
+        if share == int(share) and share < count:
+            show()
+
+    try:
+        for number, block in enumerate(blocks):
+            place = Path(store) / _name(number)
+            options: dict[str, Any] = asked | {"chunk": chunk, "progress": told, "resume": resume, "store": place}
+            sweep_directions(flow, incidences, wavenumbers=block, **options)
+            done.append(SweepStore.open(place).loaded())
+            if number + 1 < len(blocks):
+                show()
+    except BaseException:
+        # the first error is the one to tell
+        with suppress(CreepingError):
+            show(last=True)
+        raise
+    return _joined(done)
+
+
+def sizes_of(
+    flow: Flow | Surface, incidences: FloatArray, wavenumbers: FloatArray, asked: dict[str, Any]
+) -> tuple[int, int]:
+    """Wavenumbers of a block, and incidences of a task, so that a task is some seconds of work.
+
+    Rays of many incidences and wavenumbers are quicker together; where a trial is served otherwise, each value has a
+    cost of its own, and the equation a large one.
+    """
+    count, all_k, method = len(incidences), len(wavenumbers), asked["method"]
+    body = getattr(flow, "body", flow)
+    if why_no_rays(body) or is_piecewise(body) or method == "t-matrix":
+        return 1, count
+    if method == "auto":
+        ends = np.unique(wavenumbers[[0, -1]])
+        trial = sweep_directions(flow, incidences[[0, count // 2]][: min(count, 2)], wavenumbers=ends, **asked)
+        method = "currents" if any(np.any(trial[n]) for n in trial if str(n).startswith("by_currents")) else "rays"
+    if method == "rays":
+        return all_k, min(count, TASK)
+    task = 1 if method == "equation" else TASK
+    values = count * len(asked.get("observation", (None,)))
+    return (all_k, max(1, task // all_k)) if values >= TASK and count > 1 else (max(1, task // values), count)
+
+
+def _name(number: int) -> str:
+    return f"{number:04d}"
+
+
+def _so_far(done: list[xarray.Dataset], place: Path, blocks: list[FloatArray]) -> Rows | None:
+    """What the blocks hold that are done, and the one at a place; nothing if there is none yet."""
+    parts = list(done)
+    if len(parts) < len(blocks) and place.exists():
+        parts.append(SweepStore.open(place, mending=True).loaded())
+    if not parts:
+        return None
+    parts += [_empty(parts[0], block) for block in blocks[len(parts) :]]
+    known = np.concatenate(
+        [np.repeat(one["incidence_status"].values[:, None] != MISSING, one.sizes["wavenumber"], 1) for one in parts],
+        axis=1,
+    )
+    return Rows(_joined(parts), known)
+
+
+def _empty(like: xarray.Dataset, wavenumbers: FloatArray) -> xarray.Dataset:
+    """A dataset of other wavenumbers, with nothing in it."""
+    found = like.isel(wavenumber=np.zeros(len(wavenumbers), dtype=int)).assign_coords(
+        wavenumber=("wavenumber", wavenumbers, like["wavenumber"].attrs)
+    )
+    blank = {"b": False, "i": MISSING, "u": 0}
+    filled = {
+        name: values.copy(data=np.full(values.shape, blank.get(values.dtype.kind, np.nan), values.dtype))
+        for name, values in found.data_vars.items()
+    }
+    return found.assign(filled)
+
+
+def _joined(parts: list[xarray.Dataset]) -> xarray.Dataset:
+    """One dataset of blocks of wavenumbers; an incidence has failed, or is missing, if it has at any of them."""
+    if len(parts) == 1:
+        return parts[0]
+    options: dict[str, Any] = {"data_vars": "minimal", "coords": "minimal", "compat": "override", "join": "override"}
+    found = require("xarray").concat(parts, dim="wavenumber", combine_attrs="override", **options)
+    each = np.stack([one["incidence_status"].values for one in parts])
+    status = np.where(np.any(each == MISSING, axis=0), MISSING, each.max(axis=0))
+    status = np.where(np.any(each == FAILED, axis=0), FAILED, status)
+    words = count_attributes(status, [])
+    texts = dict.fromkeys(text for one in parts for text in str(one.attrs.get("errors", "")).splitlines())
+    words |= {"errors": "\n".join(texts)} if texts else {}
+    result: xarray.Dataset = found.assign(incidence_status=found["incidence_status"].copy(data=status))
+    return result.assign_attrs(words | {"sweep_digest": " ".join(one.attrs["sweep_digest"] for one in parts)})
