@@ -6,7 +6,7 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.field.labelled import power
-from creeping.sweeping.echoes import echo_of
+from creeping.sweeping.echoes import echo_of, monostatic_method
 from tests.reference import sphere
 
 RADIUS = 0.15
@@ -111,3 +111,27 @@ def test_far_fields_have_names_on_their_axes():
     np.testing.assert_allclose(far.dbsm[:, 0, 0] - far.target_strength[:, 0, 0], 10 * np.log10(4 * np.pi))
     table = far.to_dataframe()
     assert len(table) == 8 and {"total", "error", "azimuth", "unresolved"} <= set(table.columns)
+
+
+def test_beyond_the_reach_of_rays_a_matrix_serves_many_angles():
+    """Least k rho of 38 kHz is 0.2, that of the sphere 30."""
+    fish, k = sc.Ellipsoid(0.07, 0.01, 0.01), 2 * np.pi * 38e3 / 1477
+    assert monostatic_method(fish, np.array([k]), "soft", 181) == "t-matrix"
+    assert monostatic_method(sc.Sphere(), np.array([30.0]), "soft", 181) == "auto"
+
+
+def test_a_store_of_echoes_goes_on_and_is_not_written_over(tmp_path, capsys):
+    asked = {"wavenumbers": [20.0, 21.0], "azimuth": np.arange(0.0, 40.0, 4.0), "method": "rays", "cache": False}
+    plain = cr.backscatter(sc.Sphere(), **asked)
+    told = []
+    stored = cr.backscatter(sc.Sphere(), store=tmp_path / "s", rows=told.append, progress=True, **asked)
+    assert "10 of 10 incidences" in capsys.readouterr().err
+    again = cr.backscatter(sc.Sphere(), store=tmp_path / "s", resume=True, **asked)
+    for one in (stored, again):
+        assert np.array_equal(one["total_pec"], plain["total_pec"]) and "azimuth" in one.coords
+    with pytest.raises(cr.InvalidInputError, match="give resume=True"):
+        cr.backscatter(sc.Sphere(), store=tmp_path / "s", **asked)
+    with pytest.raises(cr.InvalidInputError, match="stored"):
+        cr.backscatter(sc.Sphere(), store=tmp_path / "s", resume=True, **(asked | {"azimuth": 3.0}))
+    with pytest.raises(cr.InvalidInputError, match="resume goes with store="):
+        cr.backscatter(sc.Sphere(), resume=True, **asked)
