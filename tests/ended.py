@@ -14,22 +14,32 @@ ROOT = Path(__file__).parents[1]
 
 
 @contextmanager
-def ending_after(seconds, number=signal.SIGINT):
-    """Send this process a signal after some seconds, if the work within is not done before; SIGTERM interrupts too."""
+def ending_at(owner, name, number, with_signal=signal.SIGINT):
+    """Send this process a signal before a function is called for the number-th time; SIGTERM interrupts too.
+
+    At any moment at all only a process of its own can be ended: compilers and event loops that are interrupted are of
+    no use after that. Yields the number of calls so far, in a list.
+    """
 
     def interrupt(*_):
         raise KeyboardInterrupt
 
+    calls, real = [0], getattr(owner, name)
+
+    def counted(*arguments, **options):
+        calls[0] += 1
+        if calls[0] == number:
+            signal.raise_signal(with_signal)
+        return real(*arguments, **options)
+
     before = {one: signal.signal(one, interrupt) for one in (signal.SIGINT, signal.SIGTERM)}
-    alarm = signal.signal(signal.SIGALRM, lambda *_: os.kill(os.getpid(), number))
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    setattr(owner, name, counted)
     try:
-        yield
+        yield calls
     except KeyboardInterrupt:
         pass
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, alarm)
+        setattr(owner, name, real)
         for one, handler in before.items():
             signal.signal(one, handler)
 

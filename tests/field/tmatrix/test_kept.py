@@ -1,16 +1,14 @@
 """T-matrices with a store: ended at any moment, they go on, and come to the same bits."""
 
-import time
-
 import numpy as np
 import pytest
 import shared_bodies as sc
-from ended import ending_after, killed, stamps
+from ended import ending_at, killed, stamps
 
 import creeping as cr
 from creeping.field.tmatrix import computing, solved_waves
+from creeping.storage import folder as folders
 from creeping.storage.parts import Parts
-from tests.patience import HANGS
 
 ASKED = {"wavenumber": 2.0, "boundary": "soft"}
 
@@ -28,23 +26,21 @@ def test_interrupted_at_random_moments_it_comes_to_the_same_bits(tmp_path, monke
         monkeypatch.setattr(computing, "DENSE", 0.0)
         monkeypatch.setattr("creeping.field.equation.columns.TOGETHER", 5e6)
     asked = ASKED | {"order": 3}
-    cr.t_matrix(body, **asked)
-    begun = time.perf_counter()
     expected = cr.t_matrix(body, **asked)
-    takes = time.perf_counter() - begun
+    # called of each array that is written, before its part is there, and of each that is read
+    with ending_at(folders, "_digest", 0) as calls:
+        cr.t_matrix(body, store=tmp_path / "whole", **asked)
     ends = begun = 0
-    while ends < 3:
+    while ends < 4:
         folder, found = tmp_path / str(begun), None
         begun += 1
         while found is None:
             before = stamps(folder, "*/*/manifest.json")
-            with ending_after(rng.uniform(0.0, takes) if ends < 3 else HANGS):
+            with ending_at(folders, "_digest", rng.integers(1, calls[0]) if ends < 4 else 0):
                 found = cr.t_matrix(body, store=folder, **asked)
             if found is None:
                 ends += 1
                 assert before.items() <= stamps(folder, "*/*/manifest.json").items()
-        # a time that was measured while others were busy
-        takes *= 0.8
         assert found.matrix.tobytes() == expected.matrix.tobytes() and found.extinction == expected.extinction
         # parts of what is whole are removed
         assert [path.parent.name for path in folder.glob("*/*/manifest.json")] == ["matrix"]
