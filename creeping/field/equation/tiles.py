@@ -357,7 +357,7 @@ def tiles_of(patches: Patches, wavenumber: float, boundary: Boundary, *, coarse:
     share = VARYING if boundary.varies else 1.0
     if coarse:
         return tiles_for(patches, wavenumber, side=share * WIDE, turn=share * TURN, p=POINTS - 1, cut=WIDE_CUT)
-    return tiles_for(patches, wavenumber, side=share * SIDE, turn=share * TURN)
+    return tiles_for(patches, wavenumber, side=share * SIDE, turn=share * TURN, cut=CUT)
 
 
 def tiles_for(
