@@ -157,7 +157,7 @@ class FarField(Drawn):
         return replace(fields[0], parts=parts, **lanes)
 
     def packed(self) -> dict[str, np.ndarray[Any, Any]]:
-        """Arrays of numbers, from which `unpacked` makes it again."""
+        """Arrays of numbers, (m, ...) each, from which `unpacked` makes it again."""
         names, codes = np.unique(self.method, return_inverse=True)
         words = {name: getattr(self, name) for name in ONE_EACH}
         words |= {"methods": names.tolist(), "validity": None if self.validity is None else list(self.validity)}
@@ -167,7 +167,7 @@ class FarField(Drawn):
 
     @staticmethod
     def unpacked(arrays: dict[str, np.ndarray[Any, Any]]) -> FarField:
-        """The far field of arrays that `packed` has made."""
+        """The far field of arrays, of m directions as of `packed`: fields (m,) or (m, 2, 2), L."""
         words = json.loads(bytes(arrays["words"]))
         names, validity = words.pop("methods"), words.pop("validity")
         words["validity"] = None if validity is None else Validity(*validity)

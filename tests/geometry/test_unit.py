@@ -30,8 +30,10 @@ def test_results_take_the_unit_of_their_body():
         assert near.length_unit == near.to_xarray()["x"].attrs["units"] == unit_of(body)
     assert {name: one.unit for name, one in far.items()} == {"m": "m", "L": "L"}
     labels = [far[name].plot().get_ylabel() for name in "mL"]
-    assert "dBsm" in labels[0] and "dB re 1 L$^2$" in labels[1] and "dBsm" not in labels[1]
-    assert "dBsm" in far["m"].plot(unit="m").get_ylabel()
+    assert "dB re 1 m$^2$" in labels[0] and "dB re 1 L$^2$" in labels[1]
+    # the radar's word is of conductors
+    echo = cr.far_field(fan_on(sc.Metric()), [(0, 1, 0), (0, 0.6, 0.8)], wavenumber=20.0, boundary="pec")
+    assert "dBsm" in echo.plot().get_ylabel() and "dBsm" not in far["m"].plot(unit="m").get_ylabel()
     assert far["m"].to_xarray()["wavenumber"].attrs["units"] == "m-1"
     assert " m rms" in repr(far["m"]) and " L rms" in repr(far["L"])
 
