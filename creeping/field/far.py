@@ -92,8 +92,9 @@ def far_field(
         seconds or the order is 1; where they are known to fail the body's integral equation is solved
         (`creeping.surface_currents`). "equation" solves it wherever it can, in minutes at high wavenumbers. The
         equation of a body with edges is that between its tiles (`creeping.solve`), which "auto" takes up to half a
-        minute, on coarse tiles and with a larger error where fine ones take longer. A body with edges or a conductor with joints or tips whose equation is not solved has isolated rays and
-        physical optics (`creeping.field.piecewise_far`): "rays+optics" in the result.
+        minute, on coarse tiles and with a larger error where fine ones take longer. A body with edges or a
+        conductor with joints or tips whose equation is not solved has isolated rays and physical optics
+        (`creeping.field.piecewise_far`): "rays+optics" in the result.
 
     Returns
     -------
