@@ -33,10 +33,11 @@ from creeping.field.boundary import Boundary
 from creeping.field.currents.conductor import ConductorCurrents
 from creeping.field.currents.whole_body import DEPTH, POINTS, SHALLOW, SurfaceCurrents
 from creeping.field.equation.columns import solved_columns
-from creeping.field.equation.matrix import Matrix, Places
+from creeping.field.equation.matrix import DIRECTIONS, Matrix, Places
 from creeping.field.equation.tiles import Tiles, gauss
 from creeping.field.far_result import spherical_frame
 from creeping.geodesics.bundle import as_points
+from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.quadrature import box_points
 from creeping.geometry.surface import Surface, size
 from creeping.shadow.attachment import is_lit
@@ -54,6 +55,9 @@ series judge them at each height (`tests.field.equation.test_solution`)."""
 LEAST, LEAST_NEAR = 2e-5, 5e-5
 """What is left inside, at least, for the far field, where errors of tiles cancel, and on the body and near it: a few
 times what is left of the equation and what integrals over tiles err by (`studies.accuracy.edges`)."""
+CHANGED = 2.0
+"""Error of the far field by what is left of the equation, over what that radiates: cones, tori, almonds, boxes and
+twisted ellipsoids after 2, 4 and 10 steps on coarse tiles, k = 10, are covered in 92 to 100 of 100 directions."""
 UNRESOLVED = 2.0
 """Error by what tiles do not resolve, in what two ways to the same value differ by."""
 SMOOTHED = 0.04
@@ -216,9 +220,21 @@ class _OnTiles(SurfaceCurrents):
         far = self.far(r)
         unknown = np.hypot(edges[:, 0] if known.ndim == 1 else edges[:, None], UNRESOLVED * np.abs(far - finer))
         error = LEVELS[self.boundary.kind] * np.hypot(known, unknown)
+        left = np.hypot(np.abs(self._radiated(self.change, self._everywhere, r)), self._change_amplitude)
+        error = np.hypot(error, CHANGED * left)
         # phases of waves that come back from ground that is elsewhere
         moved = 2 * self.wavenumber * self.matrix.tiles.off
         return np.asarray(np.hypot(error, moved * np.hypot(np.abs(far), self._amplitude)))
+
+    @property
+    def _everywhere(self) -> BoolArray:
+        return np.ones(len(self.lit), dtype=bool)
+
+    @cached_property
+    def _change_amplitude(self) -> FloatArray:
+        """What the rest of the equation radiates, rms over all directions, L."""
+        every = self._radiated(self.change, self._everywhere, fibonacci_directions(DIRECTIONS))
+        return np.asarray(np.sqrt(np.mean(np.abs(every) ** 2, axis=0)))
 
     def _at_fine(self, values: ComplexArray) -> ComplexArray:
         """Values at the nodes, at the finer ones."""

@@ -31,9 +31,9 @@ SECONDS, ASKED = 30.0, 300.0
 """What the equation of one incidence may take, unless the caller says, and if it is asked for."""
 PRODUCTS = 20
 """Products with the matrix, about, that an incidence takes to the tolerance."""
-LEAST_STEPS, MOST_STEPS = 2, 10
+LEAST_STEPS, MOST_STEPS = 3, 10
 """Steps of GMRES from the currents of optics on: fewer serve no one, and more change nothing that coarse tiles know."""
-PER_NODE, PER_SQUARE = 1.4e-4, 1.2e-5
+PER_NODE, PER_SQUARE = 1.4e-4, 1.4e-5
 """Seconds of a core that integrals over tiles near to a node take, and more for each node of a tile."""
 NEAR_CURVED, NEAR_FLAT = 2.3, 1.3
 """What those of a conductor take of that, by whether tiles are curved."""

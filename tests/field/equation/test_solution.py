@@ -8,7 +8,7 @@ import creeping as cr
 import scatterers as sc
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.equation import effort, solving
-from creeping.field.equation.effort import plan_of
+from creeping.field.equation.effort import Effort, plan_of
 from tests.reference import sphere
 
 D = np.array([[0.0, 0.0, 1.0], [0.6, 0.0, -0.8]])
@@ -101,14 +101,14 @@ def test_far_field_of_a_fan_is_that_of_the_equation_where_edges_diffract(flat):
 def test_a_sweep_solves_each_frequency_once_for_all_incidences(monkeypatch):
     asked, found, wavenumbers = [], [], np.array([1.0, 1.2])
     monkeypatch.setattr(solving, "KEPT", 1)
-    known = solving.solve
+    known = solving._solved
 
     def noted(*of, **how):
-        asked.append(how["wavenumber"])
+        asked.append(of[2])
         found.append(known(*of, **how))
         return found[-1]
 
-    monkeypatch.setattr(solving, "solve", noted)
+    monkeypatch.setattr(solving, "_solved", noted)
     body = sc.Cylinder(0.5, 1.0)
     ds = cr.backscatter(body, wavenumbers=wavenumbers, elevation=[10.0, 50.0], boundary="hard")
     assert asked == wavenumbers.tolist()
@@ -116,6 +116,35 @@ def test_a_sweep_solves_each_frequency_once_for_all_incidences(monkeypatch):
     one = found[0].backscatter()
     assert_allclose(one.directions, np.stack([np.cos(up), 0 * up, np.sin(up)], axis=1), atol=1e-12)
     assert_allclose(np.ravel(ds.total.sel(wavenumber=wavenumbers[0])), one.total, atol=1e-6)
+
+
+@pytest.mark.parametrize("boundary", ["hard", "soft", "pec"])
+@pytest.mark.parametrize("steps, share", [(3, 0.03), (10, 2e-3)])
+def test_a_few_steps_on_coarse_tiles_know_their_error(boundary, steps, share):
+    """From the currents of optics on, against the series of the sphere."""
+    k, d = 10.0, np.array([0.48, 0.6, -0.64])
+    r = cr.fibonacci_directions(200)
+    solution = solving._solved(sc.Sphere(), d[None], k, boundary, Effort(True, steps))
+    far = solution.far_field(r)
+    if boundary == "pec":
+        # both polarisations along and across the plane of scattering
+        along, across = sphere.pec_far_field(k, 1.0, r @ d)
+        size = np.sqrt(np.abs(along) ** 2 + np.abs(across) ** 2)
+        off = np.abs(np.linalg.norm(far.total, axis=(1, 2)) - size)
+        error = np.linalg.norm(far.error, axis=(1, 2))
+    else:
+        size = sphere.far_field(k, 1.0, r @ d, boundary)
+        off, error = np.abs(far.total - size), far.error
+    largest = 0.5 * k
+    assert np.sqrt(np.mean(off**2)) < share * largest and np.mean(off <= error) > 0.95
+    assert np.median(error) < 3 * share * largest
+
+
+def test_what_takes_too_long_on_fine_tiles_is_solved_on_coarse_ones():
+    fine = plan_of(CYLINDER, 6.0, "hard")
+    assert not fine.effort.coarse
+    solution = cr.solve(CYLINDER, D[0], wavenumber=6.0, boundary="hard", seconds=0.8 * fine.seconds)
+    assert solution.effort.coarse and solution.nodes < fine.nodes and 3 <= solution.steps <= 10
 
 
 def test_squares_that_do_not_share_their_sides_are_refused():
