@@ -55,7 +55,7 @@ class Echo(Drawn):
     unresolved : (c, n, k) of bool
         Whether an expansion fails or the error is large, as in `FarField`.
     by_currents : (c, n, k) of bool
-        Whether the currents of the body gave the value.
+        Whether currents, the integral equation or a T-matrix gave the value, rather than rays.
     sound_speed : float, m/s, optional
         Speed of the wave; the speed of light if None.
     otherwise : str

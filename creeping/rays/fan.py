@@ -215,8 +215,8 @@ def launch(
     wavenumber : float, optional, 1/L
         Lowest wavenumber for which "auto" must suffice; by default that with a median k rho of 10 at the launch points.
     n_rays : int, optional
-        Rays, shared among the arcs by length; if not given one per point of the line, at most 4096, or 32 an arc, where
-        it has several.
+        Number of rays, distributed over the arcs by length. By default one per point of the line; with
+        several arcs at most 4096 or 32 per arc, whichever is more.
     n_steps : int, optional
         Number of equal steps of travel time. By default 64 or more, as many as are needed to count caustics.
     launch_from : {"attached", "all"}

@@ -151,7 +151,7 @@ class TMatrix:
 
     @property
     def error(self) -> float:
-        """Typical error of f over all pairs of directions, L; `bistatic` gives the error of each pair."""
+        """Error of f, L, meant to cover 95 % of all pairs of directions; `bistatic` gives the error of each pair."""
         return self._lack.error
 
     # --- far fields
