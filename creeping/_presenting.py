@@ -44,12 +44,12 @@ class Drawn(Shown):
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
-            Axes to draw on; by default those of a new figure outside pyplot, which opens no window: notebooks show it
-            as the last value of a cell, and ``.figure.savefig(path)`` writes it. For a window, give axes of pyplot.
+            Axes to draw on. By default a new figure is made without pyplot and opens no window: a notebook shows it as
+            the last value of a cell, and ``.figure.savefig(path)`` writes it. For a window, give axes of pyplot.
         **options
-            ``legend=True`` adds a legend to axes that were given; a new figure has one. All others depend on the type,
-            see `line_plots`, `level_plots`, `plane_pictures`, `port_plots`, `response_plots` and `echo_pictures` of
-            `creeping.plotting`:
+            ``legend=True`` adds a legend to given axes; a new figure has one. The other options depend on the type of
+            the result; see `line_plots`, `level_plots`, `plane_pictures`, `port_plots`, `response_plots` and
+            `echo_pictures` of `creeping.plotting`:
 
             - `ShadowLine`, `ShadowCurve`, `RayFan` (``plot_line``): ``kind="parameters"``, the plane of (theta, phi) in
               degrees, or ``kind="3d"``, which 3-D axes imply; ``curves=``, iso-phase curves to draw as well;
@@ -77,13 +77,13 @@ class DrawnOnBody(Drawn):
     __slots__ = ()
 
     def to_polydata(self) -> Any:
-        """Its curves for pyvista and VTK, with the arrays of a file of `creeping.files.write_vtp`.
+        """Curves as pyvista (VTK) data, with the same arrays as a file of `creeping.files.write_vtp`.
 
-        Points are copies, and all of them: those of a ray in trouble too. No display or OpenGL is needed.
+        All points are copied, including those after a ray has ended. No display or OpenGL is needed.
 
         Returns
         -------
         pyvista.PolyData
-            Several results at once are joined by `creeping.files.polydata`.
+            `creeping.files.polydata` joins several results.
         """
         return import_module(_module).to_polydata(self)

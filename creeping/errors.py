@@ -8,14 +8,14 @@ from typing import Any
 
 
 class CreepingError(ValueError):
-    """Base of every error that creeping raises on purpose.
+    """Base class of all errors that creeping raises on purpose.
 
     Parameters
     ----------
     message : str
-        What, how many, the worst, the remedy.
+        What is wrong, in how many cases, the worst case, and the remedy.
     **numbers
-        The figures of the message, kept as attributes.
+        The numbers in the message, which become attributes of the error.
 
     Examples
     --------
@@ -39,11 +39,11 @@ class InvalidInputError(CreepingError):
 
 
 class SurfaceError(CreepingError):
-    """The body is not a closed smooth surface, or its parts contradict each other."""
+    """The body is not a closed smooth surface, or its level function and its charts disagree."""
 
 
 class SingularIncidenceError(CreepingError):
-    """The shadow line crosses itself, so it is not a set of smooth curves."""
+    """The shadow line crosses itself and is therefore not a set of smooth curves."""
 
 
 class IntegrationError(CreepingError):
@@ -55,7 +55,7 @@ class ToleranceError(CreepingError):
 
 
 class StoredMapError(CreepingError):
-    """A stored phase map is damaged, of another version or of another body."""
+    """A stored phase map is damaged, was written by another version, or belongs to another body."""
 
 
 def near_names(name: str, known: Iterable[str]) -> str:

@@ -13,16 +13,16 @@ BoolArray = NDArray[np.bool_]
 
 
 class Bodies(Shown):
-    """Bodies that scatter together, none of which touches another.
+    """Several bodies that scatter together; no two may touch.
 
     Parameters
     ----------
     parts : sequence of bodies
         Of any kind: smooth, of pieces, on facets.
     at : (n, 3), L, optional
-        Where the origin of each is put.
+        Position of the origin of each body.
     turned : (n, 3, 3), optional
-        Rotation of each about its origin, before it is put there.
+        Rotation of each body about its own origin, applied before the shift.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Bodies(Shown):
     Raises
     ------
     ValueError
-        If there are none, shapes do not fit, a matrix is no rotation, or units differ.
+        If no body is given, shapes do not match, a matrix is not a rotation, or units differ.
 
     Examples
     --------
@@ -80,11 +80,11 @@ class Bodies(Shown):
         return f"Bodies({len(self.parts)}: {', '.join(type(part).__name__ for part in self.parts[:6])})"
 
     def own(self, number: int, points: FloatArray) -> FloatArray:
-        """Points (m, 3), L, as one of the bodies has them, (m, 3), L."""
+        """Points (m, 3), L, in the coordinates of one body: (m, 3), L."""
         return np.asarray((points - self.shifts[number]) @ self.turns[number])
 
     def inside(self, points: FloatArray) -> BoolArray:
-        """Whether points (m, 3), L, are inside one of them (m,)."""
+        """Whether points (m, 3), L, are inside any of the bodies: (m,)."""
         found = np.zeros(len(points), dtype=bool)
         for number, part in enumerate(self.parts):
             x = self.own(number, points)

@@ -40,24 +40,24 @@ class Cad(FittedBody):
     path : path
         A closed body whose faces join smoothly.
     units : {"m", "mm", "cm", "um", "in", "ft", "km"}, optional
-        Unit of the numbers. STEP and IGES files state theirs, and another one is an error; BREP files do not.
+        Unit of the coordinates. STEP and IGES files state their unit, and another one is an error; BREP files do not.
     points : int
-        Points of the body that are fitted; more for bodies with fine detail.
+        Number of surface points to fit; increase it for bodies with fine detail.
     strict : bool
-        Refuse a body that is not smooth everywhere. Else it is taken in smooth pieces, which end at its `creases`;
-        `non_smooth` says where nothing is known, and rays that come there end.
+        Refuse a body that is not smooth everywhere. Otherwise the body is split into smooth pieces that end at its
+        `creases`. Rays end where `non_smooth` finds the body uncertain.
     part : str or int, optional
         Which of several bodies of the file: "largest", or a number from 1 in the order of their areas.
     cap : float, optional
-        Holes that are at most so large are closed, m; inf for all. Their borders become edges.
+        Largest hole to close, m; inf closes all. The borders of closed holes become edges.
     union : bool
-        Take the outer surface of all bodies, which may cross each other; needs the library manifold3d.
+        Take the outer surface of all bodies together; bodies may cross each other. Needs the library manifold3d.
     sew : float, optional
-        Faces whose borders are at most so far apart are sewn together first, m.
+        Largest gap between faces to sew together first, m.
     surface : {"smooth", "facets", "auto"}
-        "facets" gives a `Facets` of the same source; "auto" does where no smooth surface fits.
+        "facets" returns `Facets` of the same source; "auto" does so if no smooth surface fits.
     cache : bool or path
-        True: keep the fit in the user's cache folder; a path: in that folder; False: not at all.
+        True stores the fit in the cache folder of the user, a path in that folder; False does not store it.
     speed : str or object with ``value`` and ``gradient``, optional
         Speed c(x) of the weighted flow.
     progress : callable, optional
@@ -69,7 +69,7 @@ class Cad(FittedBody):
         Of the points.
     fit : FitReport
     coarse_fit : SplineBody
-        The same body fitted on a coarser grid: what differs on it is uncertain.
+        The same body fitted on a coarser grid; the difference shows the uncertainty of the shape.
     edges : tuple of str
         Edges and tips at which the faces do not join smoothly.
 

@@ -29,14 +29,14 @@ from scatterers.exact.revolved import Revolved
 
 @dataclass(frozen=True)
 class Cylinder(Revolved):
-    """Circular cylinder about the z axis, closed by planes; its middle is the origin.
+    """Circular cylinder about the z axis with flat ends, centred on the origin.
 
     Parameters
     ----------
     radius : float
-        L.
+        Radius, L.
     length : float
-        Along z, L.
+        Length along z, L.
     speed : str or object with ``value`` and ``gradient``, optional
         Speed c(x) of the weighted flow.
 
@@ -72,14 +72,14 @@ class Cylinder(Revolved):
 
 @dataclass(frozen=True)
 class Cone(Revolved):
-    """Circular cone about the z axis; the middle of its base is the origin.
+    """Circular cone about the z axis; the centre of the base is the origin.
 
     Parameters
     ----------
     radius : float
-        Of the base at z = 0, L.
+        Radius of the base at z = 0, L.
     length : float
-        Along z, L.
+        Length along z, L.
     top : float
         Radius at z = length, L; a tip if 0, a flat end if more.
     speed : str or object with ``value`` and ``gradient``, optional
@@ -119,21 +119,21 @@ class Cone(Revolved):
 
 @dataclass(frozen=True)
 class ConeSphere(Revolved):
-    """Cone about the z axis on a sphere, whose middle is the origin; the tip is above.
+    """Sphere about the origin with a cone tangent to it; the axis is z and the tip points towards +z.
 
     Parameters
     ----------
     radius : float
-        Of the sphere, L.
+        Radius of the sphere, L.
     length : float
-        Of the whole, L; more than twice the radius. For a half angle alpha at the tip it is radius (1 + 1/sin alpha).
+        Total length, L; more than twice the radius. A cone of half angle alpha has length radius (1 + 1/sin alpha).
     speed : str or object with ``value`` and ``gradient``, optional
         Speed c(x) of the weighted flow.
 
     Raises
     ------
     ValueError
-        If a length is not a positive finite number, the whole is too short, or the speed is not usable.
+        If a length is not a positive finite number, the body is too short, or the speed is not usable.
 
     Examples
     --------
@@ -173,21 +173,21 @@ class ConeSphere(Revolved):
 
 @dataclass(frozen=True)
 class Capsule(Revolved):
-    """Cylinder about the z axis with hemispheres at its ends; its middle is the origin.
+    """Cylinder about the z axis with hemispherical ends, centred on the origin.
 
     Parameters
     ----------
     radius : float
-        L.
+        Radius, L.
     length : float
-        Of the whole, hemispheres included, L; more than twice the radius.
+        Total length including the hemispheres, L; more than twice the radius.
     speed : str or object with ``value`` and ``gradient``, optional
         Speed c(x) of the weighted flow.
 
     Raises
     ------
     ValueError
-        If a length is not a positive finite number, the whole is too short, or the speed is not usable.
+        If a length is not a positive finite number, the body is too short, or the speed is not usable.
 
     Examples
     --------

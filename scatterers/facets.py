@@ -41,14 +41,14 @@ class Facets(Shown):
         STL, OBJ, PLY, OFF, GLB, 3MF, MSH, BDF or MESH file, or e.g. a trimesh.Trimesh; each of its parts is closed. Or
         a STEP, IGES or BREP file, whose triangles have their corners on it.
     units : {"m", "mm", "cm", "um", "in", "ft", "km"}, optional
-        Unit of the numbers; must be given for files that do not state it. An object's numbers are metres by default.
+        Unit of the coordinates; required for files that do not state it. Objects in memory are in metres by default.
     part : str or int, optional
         One of several parts: "largest", a number from 1 in the order of their areas, or a name; all by default. Parts
         inside others, which no wave reaches, are left out.
     cap : float, optional
-        Holes that are at most so large are closed, m; inf for all.
+        Largest hole to close, m; inf closes all.
     union : bool
-        Take the outer surface of all parts, which may cross each other; needs the library manifold3d.
+        Take the outer surface of all parts together; parts may cross each other. Needs the library manifold3d.
     progress : callable, optional
         Called with a line of text for each repair.
 
@@ -59,14 +59,14 @@ class Facets(Shown):
         Vertex numbers, counter-clockwise seen from outside.
     bounds : (2, 3), m
     repairs : tuple of str
-        What was changed in the mesh.
+        Changes made to the mesh.
     tessellated : bool
-        Whether the triangles stand for curved faces, as of a CAD file: errors know of what they differ by.
+        Whether the triangles approximate curved faces, as from a CAD file; errors then include the difference.
 
     Raises
     ------
     ValueError
-        If the source is not closed, crosses itself or is not finite; says what, how many and where.
+        If the source is not closed, crosses itself or is not finite; the message says how often and where.
 
     Examples
     --------
@@ -115,12 +115,12 @@ class Facets(Shown):
         return f"Facets:{digest.hexdigest()}"
 
     def inside(self, points: FloatArray) -> BoolArray:
-        """Whether points (m, 3), L, are inside (m,)."""
+        """Whether points (m, 3), L, are inside the body: (m,)."""
         along = SOMEWHERE / np.linalg.norm(SOMEWHERE)
         return np.asarray(self._crossed(points, along, 0.0, len(self.triangles)) % 2 == 1)
 
     def hidden(self, points: FloatArray, direction: FloatArray) -> BoolArray:
-        """Whether the body stands before points (m, 3), L, of a wave in a unit direction (m,)."""
+        """Whether the body blocks a plane wave along a unit direction before it reaches points (m, 3), L: (m,)."""
         least = 1e-9 * float(np.linalg.norm(np.ptp(self.bounds, axis=0)))
         return np.asarray(self._crossed(points, -direction, least, 1) > 0)
 

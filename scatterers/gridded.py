@@ -40,26 +40,26 @@ class Level(Protocol):
 
 
 class Gridded(LevelBody):
-    """Body from samples of F on a grid.
+    """Body F < 0 from samples of F on a regular grid, interpolated by splines.
 
     Parameters
     ----------
     samples : (n0, n1, n2) array_like
         F at the nodes, positive outside the body; at least 8 nodes along each axis.
     bounds : (2, 3) array_like
-        Box whose faces the outermost nodes lie on, L.
+        Box spanned by the grid, L; the outermost nodes lie on its faces.
     centre : (3,) array_like, optional
-        Point that sees the whole body from within, L; by default the middle of the body's box. A body whose slices
-        across its longest side are shifted against each other is sheared upright first, if that leaves it star-shaped.
-        A body that is not star-shaped needs no centre.
+        Interior point from which the whole surface is visible, L; by default the centre of the bounding box. If slices
+        across the longest side are shifted against each other, the body is sheared first, provided that makes it
+        star-shaped. A body that is not star-shaped needs no centre.
     speed : str or object with ``value`` and ``gradient``, optional
         Speed c(x) of the weighted flow.
 
     Raises
     ------
     ValueError
-        If the samples are too few or not finite, no node is inside, nodes of the grid's faces are not outside, or
-        the body is not star-shaped about a given centre.
+        If the samples are too few or not finite, no node lies inside the body, a node on the faces of the grid does not
+        lie outside, or the body is not star-shaped about the given centre.
 
     Examples
     --------
@@ -105,7 +105,7 @@ class Gridded(LevelBody):
         *,
         centre: ArrayLike | None = None,
     ) -> "Gridded":
-        """Sample another body's F, and take over its speed.
+        """Sample F of another body on a grid; the speed of that body is copied.
 
         Parameters
         ----------
@@ -113,14 +113,14 @@ class Gridded(LevelBody):
         nodes : int or three ints
             Nodes along each axis.
         margin : float
-            By how much of its half width, without unit, the body's box is widened on every side.
+            Margin added on every side of the bounding box, as a fraction of its half width.
         centre : (3,) array_like, optional
-            As of the class.
+            As for `Gridded`.
 
         Raises
         ------
         ValueError
-            As the class, and if the nodes or the margin are not usable.
+            On the conditions of `Gridded`, or if the nodes or the margin are not usable.
 
         Examples
         --------

@@ -62,11 +62,11 @@ class Implicit(LevelBody):
         Box that contains the body and nothing else, L; found if not given, for bodies that a cube about the origin with
         half width 2^-8 to 2^12 resolves.
     centre : (3,) array_like, optional
-        Point that sees the whole body from within, L; only star-shaped bodies have one.
+        Interior point from which the whole surface is visible, L; only star-shaped bodies have one.
     strict : bool
-        Refuse bodies with edges and tips. A body that has them, or joints, is one of smooth pieces: it has the members
-        ``pieces``, ``creases``, ``piece`` and ``tiles``, and charts only if it has neither edges nor tips. Pieces
-        smaller than a cell of the grid on which the body is looked for, a 64th of its box, may be missed.
+        Refuse bodies with edges and tips. Otherwise a body with edges, tips or joints is piecewise smooth: it has the
+        members ``pieces``, ``creases``, ``piece`` and ``tiles``, and charts only if it has neither edges nor tips.
+        Pieces smaller than 1/64 of the bounding box, a cell of the search grid, may be missed.
     speed : str or object with ``value`` and ``gradient``, optional
         Speed c(x) of the weighted flow.
 

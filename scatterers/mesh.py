@@ -62,23 +62,24 @@ class Mesh(FittedBody):
         STL, OBJ, PLY, OFF, GLB, 3MF, MSH (Gmsh) or BDF (NASTRAN) file, packed by gzip or not, or e.g. a
         trimesh.Trimesh.
     units : {"m", "mm", "cm", "um", "in", "ft", "km"}, optional
-        Unit of the numbers; must be given for files that do not state it. An object's numbers are metres by default.
+        Unit of the coordinates; required for files that do not state it. Objects in memory are in metres by default.
     strict : bool
-        Refuse a mesh that is not smooth everywhere, or whose triangles hardly resolve it. Else it is taken in smooth
-        pieces, which end at its `creases`; `non_smooth` says where nothing is known, and rays that come there end.
+        Refuse a mesh that is not smooth everywhere, or whose triangles hardly resolve it. Otherwise the body is
+        split into smooth pieces that end at its `creases`. Rays end where `non_smooth` finds the body uncertain.
     part : str or int, optional
         Which of several parts of the file: "largest", a number from 1 in the order of their areas, or a name.
     cap : float, optional
-        Holes that are at most so large are closed, m; inf for all. Their borders become edges.
+        Largest hole to close, m; inf closes all. The borders of closed holes become edges.
     union : bool
-        Take the outer surface of all parts, which may cross each other; needs the library manifold3d.
+        Take the outer surface of all parts together; parts may cross each other. Needs the library manifold3d.
     subdivide : {"auto", 1, 2, 3}, optional
-        Loop's subdivision of a coarse mesh of a smooth body, whose surface passes by its vertices; "auto" where the
-        mesh is too coarse. `repairs` tell by how much vertices moved. Meshes with edges or joints are not subdivided.
+        Number of Loop subdivisions of a coarse mesh of a smooth body; "auto" subdivides if the mesh is too coarse. The
+        subdivided surface does not pass through the vertices; `repairs` states how far they moved. Meshes with edges
+        or joints are not subdivided.
     surface : {"smooth", "facets", "auto"}
-        "facets" gives a `Facets` of the same source; "auto" does where no smooth surface fits.
+        "facets" returns `Facets` of the same source; "auto" does so if no smooth surface fits.
     cache : bool or path
-        True: keep the fit in the user's cache folder; a path: in that folder; False: not at all.
+        True stores the fit in the cache folder of the user, a path in that folder; False does not store it.
     speed : str or object with ``value`` and ``gradient``, optional
         Speed c(x) of the weighted flow.
     progress : callable, optional
@@ -89,15 +90,16 @@ class Mesh(FittedBody):
     quality : MeshQuality
     fit : FitReport
     coarse_fit : SplineBody
-        The same body fitted on a coarser grid: what differs on it is uncertain. Of a subdivided mesh, on a finer one
-        that follows the mesh as it is.
+        The same body fitted on a coarser grid; the difference shows the uncertainty of the shape. For a subdivided
+        mesh the second fit uses a finer grid and follows the original mesh.
     repairs : tuple of str
-        What was changed in the mesh.
+        Changes made to the mesh.
 
     Raises
     ------
     ValueError
-        If the source is not one closed, smooth body that its triangles resolve; says what, how many and where.
+        If the source is not one closed, smooth body that its triangles resolve; the message says what is wrong and
+        where.
 
     Examples
     --------
@@ -219,23 +221,23 @@ def examined_mesh(
     union: bool = False,
     subdivide: str | int | None = None,
 ) -> tuple[TriangleMesh, MeshQuality]:
-    """Read a mesh as `Mesh` does, and judge it; also one that `Mesh` refuses as not smooth.
+    """Read a mesh as `Mesh` does and assess its quality, even if `Mesh` would refuse it as not smooth.
 
     Parameters
     ----------
     source : path, or object with ``vertices`` and ``faces``
-        As of `Mesh`.
+        As for `Mesh`.
     units : {"m", "mm", "cm", "um", "in", "ft", "km"}, optional
-        As of `Mesh`.
+        As for `Mesh`.
     part, cap, union, subdivide
-        As of `Mesh`.
+        As for `Mesh`.
 
     Returns
     -------
     mesh : TriangleMesh
         Vertices in metres.
     quality : MeshQuality
-        Its verdict is "smooth" if `Mesh` takes the mesh as one smooth body.
+        The verdict is "smooth" if `Mesh` accepts the mesh as one smooth body.
 
     Raises
     ------

@@ -47,7 +47,7 @@ Pair = tuple[float, float]
 
 @dataclass(frozen=True)
 class Ogive(Revolved):
-    """Circular arc turned about its chord on the z axis: two tips; its middle is the origin.
+    """Circular arc rotated about its chord, the z axis; it has two tips and is centred on the origin.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ class Almond(Revolved):
     Parameters
     ----------
     length : float
-        L; that of the EMCC's is 9.936 in, the default in metres.
+        Length, L. The default is the EMCC almond, 9.936 in, in metres.
     speed : str or object with ``value`` and ``gradient``, optional
         Speed c(x) of the weighted flow.
 

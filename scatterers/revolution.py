@@ -35,21 +35,21 @@ class Revolution(Revolved):
     Parameters
     ----------
     profile : (n, 2) array_like, or sequence of segments
-        Points (z, radius), L, in order along the profile, from one end of the body to the other, joined by quintic
-        splines between corners, and by a straight line where two corners follow each other; a point that is given twice
-        is a corner. An end off the axis is closed by a plane. An end on the axis is a smooth pole if the profile meets
-        the axis at a right angle, to 0.05 radians, else a tip. Or segments of `scatterers.exact.profile`, ``Line`` and
-        ``Arc``, each beginning where the one before ends.
+        Points (z, radius), L, in order from one end of the body to the other. Quintic splines join the points between
+        corners; a straight line joins two consecutive corners. A point given twice is a corner. An end off the axis is
+        closed by a plane. An end on the axis is a smooth pole if the profile meets the axis at a right angle, within
+        0.05 radians, else a tip. Alternatively segments ``Line`` and ``Arc`` of `scatterers.exact.profile`, each
+        beginning where the previous segment ends.
     corners : iterable of int
-        Numbers of points that are corners, too; of an end, a tip.
+        Numbers of further points that are corners; an end on the axis becomes a tip.
     speed : str or object with ``value`` and ``gradient``, optional
         Speed c(x) of the weighted flow.
 
     Raises
     ------
     ValueError
-        If the profile is no table or segments, not finite, crosses itself, touches the axis between its ends, or turns
-        by more than a right angle between two points; or the speed is not usable.
+        If the profile is neither a table nor segments, is not finite, crosses itself, touches the axis between
+        its ends, or turns by more than a right angle between two points; or the speed is not usable.
 
     Examples
     --------

@@ -54,7 +54,7 @@ def checked_plain(body: Surface, *, smooth: str = "", edgeless: str = "") -> Non
     ``edgeless`` says what does not mind joints and tips, but edges.
     """
     if speed_of(body) is not None:
-        raise InvalidInputError(f"{body!r} has a speed; the diffracted field is that of a plain body")
+        raise InvalidInputError(f"{body!r} has a speed; diffracted fields need a body without speed")
     if smooth or (edgeless and has_edges(body)):
         checked_smooth(body, smooth or edgeless, "its far field is known, by creeping.far_field")
 
@@ -85,7 +85,7 @@ def checked_across(body: Surface, *wavenumbers: float) -> None:
             unit = unit_of(body)
             raise InvalidInputError(
                 f"the body is {across:.2g} wavelengths across ({2 * np.pi * across / k:.4g} {unit} at wavenumber "
-                f"{k:.4g}/{unit}), {'more' if across > 1 else 'fewer'} than any field here is known for, {ACROSS[0]:g} "
+                f"{k:.4g}/{unit}), {'more' if across > 1 else 'fewer'} than any field here is valid for, {ACROSS[0]:g} "
                 f"to {ACROSS[1]:g}; give k in 1/{unit}: creeping.wavenumber('10 GHz') for a body in metres",
                 across=across,
             )
@@ -96,8 +96,8 @@ def checked(wavenumber: float, order: int, body: Surface | None = None) -> float
     given: Any = wavenumber
     if isinstance(given, str):
         raise InvalidInputError(
-            f"wavenumber = {given!r} is text; give creeping.wavenumber({given!r}), in 1/m, of a body in "
-            "metres; of sound with its sound_speed="
+            f"wavenumber = {given!r} is text; give creeping.wavenumber({given!r}), in 1/m, for a body in "
+            "metres; for sound give sound_speed="
         )
     if isinstance(wavenumber, complex | np.complexfloating):
         raise InvalidInputError(f"wavenumber = {wavenumber!r} is complex; give a real one: losses belong to the medium")

@@ -57,19 +57,19 @@ _CURRENTS: "WeakKeyDictionary[RayFan, dict[Any, SurfaceCurrents]]" = WeakKeyDict
 def surface_currents(
     fan: RayFan, *, wavenumber: float, boundary: BoundaryLike = "soft", solve: bool | None = None
 ) -> SurfaceCurrents:
-    """Currents of the whole body of a fan, by expansions, or by its integral equation.
+    """Currents on the whole body for the incidence of a fan, by expansions or from the integral equation.
 
     Parameters
     ----------
     fan : RayFan
-        Its flow and its line are used; rays are as long and as dense as the wavenumber asks for.
+        Only the flow and the shadow line are used. New rays are launched, as long and dense as the wavenumber requires.
     wavenumber : float, 1/L
     boundary : "soft", "hard", "pec" or ImpedanceBoundary
     solve : bool, optional
-        Whether the equation is solved, as by `creeping.solve`. By default it is where expansions are known to fail, on
-        a body with edges, joints or tips, one that may reflect onto itself, hides part of its shadow line or has an
-        admittance that steps, or where they leave more than 2 % of the incident wave inside or cannot be judged, and
-        it costs less than about 30 seconds; True is for as much as 300.
+        Whether to solve the integral equation, as `creeping.solve` does. By default it is solved if that takes less
+        than about 30 seconds and expansions fail or are doubtful: the body has edges, joints or tips, may reflect onto
+        itself, or hides part of its shadow line; the admittance has steps; or the residual field inside the body
+        exceeds 2 % of the incident wave or cannot be measured. True allows up to 300 seconds.
 
     Returns
     -------
@@ -78,8 +78,8 @@ def surface_currents(
     Raises
     ------
     InvalidInputError
-        On a bad wavenumber or boundary, for a weighted body, for one without expansions whose equation is not solved,
-        and if ``solve`` is asked of a body that needs too many nodes.
+        On a bad wavenumber or boundary, for a weighted body, for a body without expansions whose equation is not
+        solved, or if ``solve`` is True and the body needs too many nodes.
     SurfaceError
         If the wavenumber is too high for any mesh of the body.
 
@@ -107,8 +107,8 @@ def surface_currents(
         return _of_line(fan, found)
     if not has_expansions(fan.body, boundary):
         raise InvalidInputError(
-            "a body with edges, or a conductor with joints, has no currents but those of its integral equation, not "
-            f'solved at wavenumber {k:g}: give solve=True or method="equation"; far_field has rays'
+            "currents of a body with edges, or of a conductor with joints, need the integral equation, which is not "
+            f'solved at wavenumber {k:g}: give solve=True or method="equation", or use far_field with method="rays"'
         )
     lit = lit_nodes(fan.body, fan.line, k)
     try:

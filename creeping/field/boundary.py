@@ -25,7 +25,7 @@ from creeping.geometry.arguments import one_of, shown
 
 @dataclass(frozen=True)
 class Coating:
-    """An admittance that varies over the body: a function of points (n, 3), or an object whose ``value`` is one."""
+    """Admittance that varies over the body: a function of points (n, 3), or an object whose ``value`` is one."""
 
     given: Any
 
@@ -35,14 +35,14 @@ class Coating:
         Raises
         ------
         InvalidInputError
-            If it is not one finite number a point, or its real part is negative somewhere.
+            If it does not give one finite number per point, or the real part is negative somewhere.
         """
         function = getattr(self.given, "value", self.given)
         eta = np.asarray(function(np.asarray(points)))
         if eta.dtype.kind not in "fciu" or eta.shape not in ((), (len(points),)):
             raise InvalidInputError(
                 f"admittance {shown(self.given)} gives {eta.dtype} of shape {eta.shape} for points {np.shape(points)}; "
-                "it is to give one number for each row"
+                "give one number for each row"
             )
         eta = np.broadcast_to(eta, (len(points),)).astype(complex)
         off = ~np.isfinite(eta)
@@ -70,10 +70,10 @@ class ImpedanceBoundary:
     Parameters
     ----------
     admittance : complex or callable
-        Relative admittance eta, without unit: 0 is hard, infinite is soft, 1 absorbs at normal incidence; passive
-        if the real part is not negative. One that varies smoothly over the body is a function of points (n, 3), L, or
-        an object whose method ``value`` is one, such as ``scatterers.Coating("0.3 + 0.1*z")``. By currents and marched
-        waves, which are those of points and of the far field of one incidence.
+        Relative admittance eta, without unit: 0 is hard, the limit of infinity is soft, 1 absorbs at normal incidence.
+        A real part >= 0 makes the boundary passive. An admittance that varies smoothly over the body is a function of
+        points (n, 3), L, or an object with such a method ``value``, e.g. ``scatterers.Coating("0.3 + 0.1*z")``. It has
+        no creeping modes: use fields at points, `far_field` with currents, or the integral equation.
 
     Raises
     ------
@@ -110,8 +110,8 @@ class ImpedanceBoundary:
             admittance = complex(given)
         except (TypeError, ValueError, OverflowError, RecursionError) as error:
             raise InvalidInputError(
-                f"admittance = {shown(given)} is not a complex number, nor a function of points; of a text in x, y, z "
-                "scatterers.Coating makes one"
+                f"admittance = {shown(given)} is not a complex number, nor a function of points; for a text in x, y, z "
+                "use scatterers.Coating"
             ) from error
         if not np.isfinite(admittance):
             raise InvalidInputError(f"admittance = {self.admittance!r} is not finite; for an infinite one use 'soft'")
@@ -169,8 +169,8 @@ class Boundary:
         """Parameter q of the Airy functions at a Fock scale m (...): None if soft, 0 if hard, else (...)."""
         if self.coating is not None:
             raise InvalidInputError(
-                f"the admittance {self.coating} varies, and creeping modes are those of a constant one; fields at "
-                "points, and far_field of one incidence by method='currents' (or 'auto') do without them"
+                f"the admittance {self.coating} varies, and creeping modes need a constant one; use fields at "
+                "points, or far_field of one incidence with method='currents' (or 'auto')"
             )
         if self.kind == "impedance":
             return np.asarray(1j * m * self.admittance)

@@ -27,20 +27,20 @@ FLOOR = 80.0
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Levels of fields in directions or at frequencies against a reference.
+    """Computed levels against reference levels, over angle or frequency.
 
     Attributes
     ----------
     values : (m,)
-        Places of the reference that lie within the computed ones: degrees or Hz.
+        Reference angles or frequencies within the computed range: degrees or Hz.
     levels, reference : (m,), dB
-        Computed, interpolated there, and given.
+        Computed levels, interpolated at ``values``, and reference levels.
     shift : float
-        What was added to the reference's places to bring both together.
+        Shift of the reference angles or frequencies that makes both agree best.
     within : float
-        Share of the places where the reference lies within the stated error; NaN without one.
+        Share of the points at which the reference lies within the stated error; NaN if no error was given.
     wrapped : int
-        Places that were brought to the computed ones by whole periods.
+        Number of reference points that were moved by whole periods into the computed range.
 
     Examples
     --------
@@ -59,7 +59,7 @@ class Comparison:
 
     @property
     def residual(self) -> FloatArray:
-        """Computed less given (m,), dB."""
+        """Computed minus reference level (m,), dB."""
         return self.levels - self.reference
 
     @property
@@ -74,12 +74,12 @@ class Comparison:
 
     @property
     def austin(self) -> float:
-        """Measure of the Austin suite, dB."""
+        """Mean |residual|, dB, as in the Austin suite: levels are cut off 80 dB below the largest of the reference."""
         least = self.reference.max() - FLOOR
         return float(np.mean(np.abs(np.maximum(self.levels, least) - np.maximum(self.reference, least))))
 
     def summary(self) -> dict[str, float]:
-        """Numbers by name, dB."""
+        """Statistics by name: residuals in dB, share within the error, shift, number of points."""
         return {
             "mean_db": self.mean,
             "rms_db": self.rms,
@@ -103,26 +103,26 @@ def compare(
     align: float = 0.0,
     period: float | None = None,
 ) -> Comparison:
-    """Compare levels with a reference's, over directions or frequencies.
+    """Compare computed levels with reference levels, over angle or frequency.
 
     Parameters
     ----------
     values, levels : (n,), degrees or Hz, and dB
-        Computed, ascending; interpolated at the reference's places, so give them finely enough.
+        Computed angles or frequencies, ascending, and levels. Sample finely: levels are interpolated at the reference.
     reference_values, reference : (m,)
-        Given; what is not finite, or outside the computed places, is left out.
+        Reference. Points that are not finite or lie outside the computed range are left out.
     low, high : (n,), dB, optional
         Levels that the stated error allows.
     align : float, degrees or Hz
-        Largest shift of the reference that is tried: a turntable has its own zero.
+        Largest shift of the reference to try, e.g. for the unknown zero of a turntable.
     period : float, optional
-        What places repeat after: 360 of azimuths in degrees, so that a reference over 0 to 360 fits -180 to 180. Polar
-        angles and frequencies have none.
+        Period of ``values``: 360 for azimuths in degrees, so that a reference over 0 to 360 matches -180 to 180.
+        Leave it out for polar angles and frequencies.
 
     Raises
     ------
     InvalidInputError
-        If the arrays do not fit, or have no place in common.
+        If the shapes of the arrays differ, or the reference and the computed range do not overlap.
 
     Examples
     --------
@@ -154,7 +154,7 @@ def compare(
     if not np.any(ok):
         again = "" if period is None else f", whole periods of {period:g} apart or not"
         raise InvalidInputError(
-            f"the reference, from {at.min():g} to {at.max():g}, has no place with what was computed, "
+            f"the reference, from {at.min():g} to {at.max():g}, has no place in common with the computed range, "
             f"from {ends[0]:g} to {ends[1]:g}{again}"
         )
     there, here = places[ok], given[ok]
@@ -191,7 +191,7 @@ def _turned(x: FloatArray, at: FloatArray, period: float | None) -> FloatArray:
 def _pair(values: ArrayLike, levels: ArrayLike, what: str) -> tuple[FloatArray, FloatArray]:
     x, y = np.asarray(values, dtype=float), np.asarray(levels, dtype=float)
     if x.ndim != 1 or x.shape != y.shape or not len(x) or not np.all(np.isfinite(x)):
-        raise InvalidInputError(f"{what} of shapes {x.shape} and {y.shape} are not two rows of as many numbers")
+        raise InvalidInputError(f"{what} of shapes {x.shape} and {y.shape} are not two rows of equal length")
     return x, y
 
 

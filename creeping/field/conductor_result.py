@@ -24,7 +24,7 @@ PARTS = ("incident", "scattered", "creeping")
 
 
 class Fields(NamedTuple):
-    """E and H at points (..., 3), in units of the incident E, H times the impedance of free space.
+    """E, and H times the impedance of free space, at points (..., 3), in units of the incident E.
 
     Examples
     --------
@@ -44,14 +44,14 @@ class ConductorField(PointData):
     Attributes
     ----------
     points, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
-        As of every field at points; the error holds for E and for H. ``method`` is "currents", "equation" where
-        the body's integral equation gave them, "layer" between them and the body, or "rays"; on the body that of
-        `ConductorCurrent`.
+        As for every field at points; the error holds for E and for H. Off the body ``method`` is "currents",
+        "equation" (currents from the integral equation), "layer" (interpolated between the body and the currents'
+        field, next to the body) or "rays"; on the body as in `ConductorCurrent`.
     incident, scattered, creeping : Fields
-        Parts, whose sum the field is: where currents were used, or the expansion of the lit side, the incident wave and
-        the rest; where rays did, the sum over them, which in the shadow is the whole field.
+        Parts that add up to the field. Currents and the lit side's expansion give ``incident`` and ``scattered``. Rays
+        give ``creeping``, which in the shadow is the total field.
     incident_electric : (3,) or (3, 2) complex
-        E0 of the incident wave, of both polarisations if none was chosen.
+        E0 of the incident wave; (3, 2) for both polarisations, if none was chosen.
 
     Examples
     --------
@@ -77,18 +77,18 @@ class ConductorField(PointData):
 
     @property
     def H(self) -> ComplexArray:  # noqa: N802
-        """Total magnetic field times the impedance of free space (..., 3) or (..., 3, 2)."""
+        """Total magnetic field H, times the impedance of free space: (..., 3) or (..., 3, 2)."""
         return np.asarray(self.incident.H + self.scattered.H + self.creeping.H)
 
     @property
     def magnitude(self) -> FloatArray:
-        """The larger of |E| and |H| (...), of the shape of the status."""
+        """The larger of |E| and |H|, in the shape of ``status``."""
         axis = self.points.ndim - 1
         return np.asarray(np.maximum(np.linalg.norm(self.E, axis=axis), np.linalg.norm(self.H, axis=axis)))
 
     @property
     def power_flow(self) -> FloatArray:
-        """Re E x H*, the mean flow of power in units of the incident one (..., 3) or (..., 3, 2)."""
+        """Re E x H*: time-averaged power flow in units of the incident power flow, (..., 3) or (..., 3, 2)."""
         axis = self.points.ndim - 1
         return np.asarray(np.cross(self.E, self.H.conj(), axis=axis).real)
 
@@ -98,7 +98,7 @@ class ConductorField(PointData):
         return "of the incident E"
 
     def to_xarray(self) -> xarray.Dataset:
-        """E, H, their parts, error and status with names: an ``xarray.Dataset`` by point, component, polarisation."""
+        """``xarray.Dataset`` of E, H, their parts, error and status, by point, component and polarisation."""
         from creeping.field.point_result import vector_dataset
 
         parts = {f"{letter}_{name}": getattr(getattr(self, name), letter) for name in PARTS for letter in "EH"}
@@ -107,22 +107,22 @@ class ConductorField(PointData):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ConductorCurrent(ArrayResult, PointData):
-    """Current J = n x H on a perfect conductor, in units of the incident H; it acts as the array of J.
+    """Current J = n x H on a perfect conductor, in units of the incident H; usable as the array of J.
 
     Attributes
     ----------
     points, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
-        As of every field at points; ``method`` is "lit", "rays", "beams" where these merge, or, in the penumbra, both
-        with "lit+".
+        As for every field at points. ``method`` is "lit" (the lit side's expansion), "rays" (creeping modes), "beams"
+        (near caustics), or, in the penumbra, "lit+rays" or "lit+beams".
     values : (..., 3) or (..., 3, 2) complex
     charge : (...) or (..., 2) complex
-        n.E = div J/(ik), the surface charge over the permittivity of free space, in units of the incident E.
+        n.E = div J/(ik): surface charge density over the permittivity of free space, in units of the incident E.
     charge_error : (...) or (..., 2)
-        Of the charge, in the sense of the error: that of J by expansions, its own where they are solved.
+        Error of the charge, as ``error``: equal to that of J for expansions, estimated apart for the equation.
     lit, creeping : as values
-        Parts, whose sum the values are: what the lit side's expansion gives, and creeping rays.
+        Parts that add up to the values: the lit side's expansion, and creeping rays.
     incident_electric : (3,) or (3, 2) complex
-        E0 of the incident wave, of both polarisations if none was chosen.
+        E0 of the incident wave; (3, 2) for both polarisations, if none was chosen.
 
     Examples
     --------
@@ -151,7 +151,7 @@ class ConductorCurrent(ArrayResult, PointData):
 
     @property
     def magnitude(self) -> FloatArray:
-        """|J| (...), of the shape of the status."""
+        """|J|, in the shape of ``status``."""
         return np.asarray(np.linalg.norm(self.values, axis=self.points.ndim - 1))
 
     @property
@@ -160,7 +160,7 @@ class ConductorCurrent(ArrayResult, PointData):
         return "of the incident H"
 
     def to_xarray(self) -> xarray.Dataset:
-        """J, its parts, charge, error and status with names: an ``xarray.Dataset`` by point and component."""
+        """``xarray.Dataset`` of J, its parts, charge, error and status, by point and component."""
         from creeping.field.point_result import vector_dataset
 
         parts = {"J": self.values, "charge": self.charge, "lit": self.lit, "creeping": self.creeping}

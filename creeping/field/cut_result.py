@@ -55,20 +55,22 @@ ALONG = np.cos(np.radians(30.0))
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FieldCut(Drawn):
-    """Field on a rectangle (ny, nx) of a plane.
+    """Field on a rectangular grid (ny, nx) in a plane.
 
     Attributes
     ----------
     line : ShadowLine
-        Of the incidence, and by it the body.
+        Shadow line of the incidence; it holds the body too.
     point : (3,), L
-        Where across and up are 0.
+        Origin of ``across`` and ``up``.
     axes : (2, 3)
-        Unit vectors, across and up, at right angles.
+        Orthogonal unit vectors along ``across`` and ``up``.
     across, up : (nx,) and (ny,), L
+        Coordinates of the grid points.
     outside : (ny, nx) bool
+        Whether each grid point is outside the body.
     field : NearField or ConductorField
-        At the points outside (m,), in the order of the grid's rows.
+        Field at the m points outside the body, row by row.
 
     Examples
     --------
@@ -94,22 +96,22 @@ class FieldCut(Drawn):
 
     @property
     def body(self) -> Surface:
-        """The body that is cut."""
+        """Body of the shadow line."""
         return self.line.body
 
     @property
     def points(self) -> FloatArray:
-        """Points of the grid (ny, nx, 3), L."""
+        """Grid points (ny, nx, 3), L."""
         return grid_points(self.point, self.axes, self.across, self.up)
 
     @property
     def step(self) -> float:
-        """Larger spacing of the points, L."""
+        """Larger of the two grid spacings, L."""
         return float(max(self.across[1] - self.across[0], self.up[1] - self.up[0]))
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """What can be shown: "u", or "E" and "H" of a conductor."""
+        """Quantities that `wave` and `magnitude` accept: "u", or "E" and "H" for a conductor."""
         return ("E", "H") if isinstance(self.field, ConductorField) else ("u",)
 
     @property
@@ -124,16 +126,16 @@ class FieldCut(Drawn):
 
     @property
     def status_counts(self) -> dict[str, int]:
-        """Number of points outside of each status that occurs, by name."""
+        """Number of points outside the body by name of status; only statuses that occur."""
         return self.field.status_counts
 
     def on_grid(self, values: Any, inside: Any = np.nan) -> Any:
-        """Put values at the points outside (m, ...) on the grid (ny, nx, ...), another value inside the body.
+        """Place values (m, ...) of the outside points on the grid (ny, nx, ...); fill the interior with ``inside``.
 
         Raises
         ------
         InvalidInputError
-            If there is not one for each point.
+            If the number of values is not m.
         """
         given = np.asarray(values)
         if len(given) != len(self.field.points):
@@ -143,7 +145,7 @@ class FieldCut(Drawn):
         return found
 
     def wave(self, quantity: str | None = None) -> ComplexArray:
-        """Field with its phase (ny, nx), NaN inside: u; of E and H the component that the incident wave has."""
+        """Complex field (ny, nx), NaN inside the body: u, or the component of E or H along the incident E or H."""
         chosen = self._chosen(quantity)
         if isinstance(self.field, NearField):
             return np.asarray(self.on_grid(self.field.values, complex(np.nan, np.nan)))
@@ -153,14 +155,14 @@ class FieldCut(Drawn):
         return np.asarray(self.on_grid(np.einsum("nc,c->n", getattr(self.field, chosen), own.conj())))
 
     def magnitude(self, quantity: str | None = None) -> FloatArray:
-        """|u|, |E| or |H| (ny, nx), NaN inside."""
+        """|u|, |E| or |H| (ny, nx), NaN inside the body."""
         chosen = self._chosen(quantity)
         if isinstance(self.field, NearField):
             return np.abs(self.wave())
         return np.asarray(self.on_grid(np.linalg.norm(getattr(self.field, chosen), axis=-1)))
 
     def shadow_points(self) -> FloatArray:
-        """Where the shadow line crosses the plane, within the rectangle: (n, 2), L, across and up."""
+        """Intersections of the shadow line with the rectangle: (n, 2), L, coordinates across and up."""
         found = [np.zeros((0, 2))]
         normal = np.cross(*self.axes)
         for curve in self.line.curves:
@@ -176,7 +178,7 @@ class FieldCut(Drawn):
         return np.asarray(flat[np.all((flat >= low) & (flat <= high), axis=1)])
 
     def to_xarray(self) -> xarray.Dataset:
-        """Field, parts, error and status over ``up`` and ``across``, NaN inside the body: an ``xarray.Dataset``."""
+        """``xarray.Dataset`` of field, parts, error and status over ``up`` and ``across``; NaN inside the body."""
         flat, dims = self.field.to_xarray(), ("up", "across")
         fill = {"i": INSIDE, "U": ""}
         variables = {
@@ -243,19 +245,19 @@ def field_cut(
     wavenumber : float, 1/L
     boundary : "soft", "hard", ImpedanceBoundary or "pec"
     point : (3,), L, optional
-        In the middle; by default that of the body's box.
+        Centre of the rectangle; by default the centre of the body's bounding box.
     across, up : (3,), optional
-        Directions that span the plane. By default that of the wave, and the body's longest side that is not along it;
-        ``up`` is taken at right angles to ``across``.
+        Directions that span the plane; ``up`` is made orthogonal to ``across``. By default the direction of the wave,
+        and the longest side of the bounding box that is not along that direction.
     extent : (width, height), L, optional
-        By default the body with 0.75 of its longest side all round.
+        By default the bounding box plus a margin of 0.75 times its longest side.
     step : float, L, optional
-        Spacing of points. By default an eighth of a wavelength; coarser, down to a fifth, where currents would cost
-        more than `near_field` takes them for, and coarser than that where there would be more than 60 000 points.
+        Grid spacing; by default an eighth of a wavelength. It grows to at most a fifth of a wavelength if `near_field`
+        would otherwise find currents too expensive, and further if the grid would exceed 60 000 points.
     order, method
-        As of `near_field`; of a conductor 2, and "auto" or "equation".
+        As for `near_field`; for a conductor 2, and "auto" or "equation".
     polarisation : "theta", "phi" or (3,) complex, optional
-        Of the wave that falls on a conductor, by default "theta".
+        Polarisation of the incident wave, for a conductor; by default "theta".
 
     Returns
     -------
@@ -265,8 +267,8 @@ def field_cut(
     Raises
     ------
     InvalidInputError
-        On directions that span no plane, a bad extent or step, one that makes more than 400 000 points, a rectangle
-        within the body, and as `near_field` and `conductor_field`.
+        If the directions span no plane, the extent or step is not usable, the grid has more than 400 000 points or lies
+        within the body, or for the reasons given at `near_field` and `conductor_field`.
     SurfaceError
         As `near_field`.
 

@@ -32,7 +32,7 @@ LEVELS = {"rcs": ("radar cross section", "dBsm"), "ts": ("target strength", "dB 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Echo(Drawn):
-    """Echo in c channels at n angles and k wavenumbers; lengths are metres.
+    """Echo in c channels at n angles and k wavenumbers; lengths are in metres.
 
     Attributes
     ----------
@@ -49,14 +49,17 @@ class Echo(Drawn):
     total : (c, n, k) complex, m
         Amplitude f.
     parts : dict of str to (c, n, k) complex, m
-        What waves it is the sum of, NaN where rays do not serve.
+        Contributions that add up to ``total`` (creeping, reflected, forward); NaN where no rays were summed.
     error : (c, n, k), m
-        Of the amplitude's magnitude.
-    unresolved, by_currents : (c, n, k) of bool
+        Error of |f|.
+    unresolved : (c, n, k) of bool
+        Whether an expansion fails or the error is large, as in `FarField`.
+    by_currents : (c, n, k) of bool
+        Whether currents, the integral equation or a T-matrix gave the value, rather than rays.
     sound_speed : float, m/s, optional
-        That of light if None.
+        Speed of the wave; the speed of light if None.
     otherwise : str
-        The method used where currents were not: "rays", or "rays+optics" of a body with edges, joints or tips.
+        Method used where ``by_currents`` is False: "rays", or "rays+optics" for a body with edges, joints or tips.
 
     Raises
     ------
@@ -110,40 +113,40 @@ class Echo(Drawn):
 
     @property
     def angles(self) -> FloatArray:
-        """The angle that varies (n,), degrees."""
+        """Azimuth or elevation, whichever varies: (n,), degrees."""
         return self.elevation if self.angle_name == "elevation" else self.azimuth
 
     @property
     def hertz(self) -> FloatArray:
-        """Frequencies (k,), Hz, to 14 digits: what wavenumbers and ranges round is the digit behind them."""
+        """Frequencies (k,), Hz, rounded to 14 digits, which removes the rounding of the wavenumbers."""
         found = np.atleast_1d(frequency(self.wavenumbers, sound_speed=self.sound_speed))
         return np.array([float(f"{value:.14g}") for value in found])
 
     @property
     def level_name(self) -> tuple[str, str]:
-        """What the levels are, and their unit."""
+        """Name of the level, e.g. "radar cross section", and its unit."""
         return LEVELS[self.quantity]
 
     def levels(self, amplitude: ComplexArray | FloatArray | None = None) -> FloatArray:
-        """Levels, dB, of the total (c, n, k), or of another amplitude (...), metres: of its shape."""
+        """Levels, dB, of ``total`` (c, n, k), or of another amplitude (...), m, in the shape of that amplitude."""
         values = self.total if amplitude is None else amplitude
         return cross_section_decibels(values) if self.quantity == "rcs" else decibels(values)
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Levels, dB, of the amplitude less and more its error: (c, n, k) each, down to -inf."""
+        """Levels, dB, of |f| - error and |f| + error: (c, n, k) each; the lower may be -inf."""
         size = np.abs(self.total)
         return self.levels(np.maximum(size - self.error, 0.0)), self.levels(size + self.error)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Amplitude, parts, level, error and flags with names, by channel, angle and frequency."""
+        """``xarray.Dataset`` of amplitude, parts, level, error and flags by channel, angle and frequency."""
         return echo_dataset(self)
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """The same as a ``pandas.DataFrame``, one row a value."""
+        """Contents of `to_xarray` as a ``pandas.DataFrame``, one row per value."""
         return self.to_xarray().to_dataframe()
 
     def summary(self) -> dict[str, Any]:
-        """Numbers that tell what it is like."""
+        """Sizes, largest level of each channel, error and number of unresolved values, by name."""
         levels, size = self.levels(), np.abs(self.total)
         with np.errstate(divide="ignore", invalid="ignore"):
             off = 20 * np.log10(1 + self.error / size)

@@ -75,39 +75,40 @@ def far_field(
     order: int = 2,
     method: str = "auto",
 ) -> FarField:
-    """Far field scattered by the body of a fan, with its error.
+    """Far field scattered by the body of a fan, and its error.
 
     Parameters
     ----------
     fan : RayFan
-        Long enough to pass where rays leave towards the observers; rays beyond its length are left out.
+        Its rays must be long enough to pass the places where waves leave towards the observers. Longer paths are left
+        out.
     observation : (..., 3)
         Directions r from the body to the observers; need not be unit. Flattened to (m, 3).
     wavenumber : float, 1/L
     boundary : "soft", "hard", "pec" or ImpedanceBoundary
     order : 2 or 1
-        Second-order creeping waves, or the leading order, which is by rays.
+        Order of the creeping waves. Order 1, the leading order, uses sums over rays only.
     method : {"auto", "currents", "rays", "equation"}
-        The currents of the whole body, or isolated rays. "auto" takes currents unless they cost more than some ten
-        seconds or the order is 1; where they are known to fail the body's integral equation is solved
-        (`creeping.surface_currents`). "equation" solves it wherever it can, in minutes at high wavenumbers. The
-        equation of a body with edges is that between its tiles (`creeping.solve`), which "auto" takes up to half a
-        minute, on coarse tiles and with a larger error where fine ones take longer. A body with edges or a
-        conductor with joints or tips whose equation is not solved has isolated rays and physical optics
-        (`creeping.field.piecewise_far`): "rays+optics" in the result.
+        "currents" radiates the currents of the whole body, "rays" sums over isolated rays. "auto" uses currents if
+        they take less than about ten seconds and the order is 2, else rays. Where expansions of the currents are known
+        to fail, it solves the integral equation (`creeping.surface_currents`). "equation" solves it wherever possible,
+        which takes minutes at high wavenumbers. For a body with edges the equation is that of `creeping.solve`;
+        "auto" allows it half a minute, and uses coarse tiles, with a larger error, if fine ones take longer. If the
+        equation is not solved for a body with edges, or a conductor with joints or tips, the field is the sum of
+        isolated rays and physical optics (`creeping.field.piecewise_far`); ``method`` is then "rays+optics".
 
     Returns
     -------
     FarField
-        Geometry and currents are kept with the fan: the same directions, or the same frequency, cost less again.
+        The fan caches geometry and currents: repeated calls with the same directions or wavenumber are faster.
 
     Raises
     ------
     InvalidInputError
-        On bad directions, wavenumber, boundary, order or method, for a weighted body, and if the equation is asked
-        for and the body has edges, is rough or needs too many nodes.
+        On bad directions, wavenumber, boundary, order or method, for a weighted body, or if
+        method="equation" and the body has edges, is rough or needs too many nodes.
     SurfaceError
-        If currents are asked for and the wavenumber is too high for any mesh of the body.
+        If currents are requested and the wavenumber is too high for any mesh of the body.
 
     Examples
     --------

@@ -49,49 +49,49 @@ ACROSS = 1e-6
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FarField(Drawn):
-    """Far field in m directions, a length; scalar, or (θ̂, φ̂) scattered by (θ̂, φ̂) incident.
+    """Far-field amplitude f, L, in m directions; for a conductor a matrix, scattered (θ̂, φ̂) by incident (θ̂, φ̂).
 
     Attributes
     ----------
     directions : (m, 3)
-        Unit r, from the body to the observer.
+        Unit vectors r from the body to the observers.
     total : (m,) or (m, 2, 2) complex, L
         The amplitude f.
     parts : dict of str to complex, L
-        What ``total`` is the sum of. Of rays "creeping", "reflected" and "forward": what creeping rays shed, what the
-        lit side reflects, the forward lobe; where they are blended each carries its weight. Of currents "lit" and
-        "dark": what the currents of both sides of the shadow line radiate, which are no rays.
+        Contributions that add up to ``total``. Sums over rays have "creeping" (shed by creeping rays), "reflected"
+        (from the lit side) and "forward" (the forward lobe), each with its blending weight. Currents have "lit" and
+        "dark": the radiation of the currents on either side of the shadow line.
     method : (m,) of str
-        What gave the field: "currents" by expansions, "equation" where the body's integral equation gave them,
-        "rays+optics" of a body with edges, or what gave the part of the creeping rays, "forward", "rays", "fan", or
-        several joined by "+".
+        "currents" (by expansions), "equation" (currents from the integral equation) or "rays+optics" (a body with
+        edges). For sums over rays: how the creeping part was computed, "forward", "rays", "fan", or several joined
+        by "+".
     unresolved : (m,) of bool
-        Whether an expansion fails there for more than a twentieth of the field: a caustic of creeping rays that the
-        fan integral does not cover, a caustic of the reflected field (a specular point on a nearly flat region), or a
-        forward lobe with no bisector contour (a concave region) or with a rim that the body hides in part; or whether
-        rays that end too early may lack so much there (`creeping.field.likely_cells`); or whether,
-        where k times the radii is below 4, the error is more than half of all contributions. With currents, whether
-        it is more than a tenth of the largest |f|.
+        Sums over rays: True if a contribution above a twentieth of the field comes from an expansion that fails,
+        namely at a caustic of creeping rays that the fan integral does not cover, at a caustic of the reflected field
+        (a specular point on a nearly flat region), or in a forward lobe without bisector contour (a concave region)
+        or whose rim the body hides in part; if rays that end too early may lack as much
+        (`creeping.field.likely_cells`); or if k times the radius of curvature is below 4 and the error exceeds half
+        the sum of all contributions. Currents: True if the error exceeds a tenth of the largest |f|.
     error : (m,) or (m, 2, 2), L
-        Of |f|, meant to hold in 95 of 100 directions; NaN where it is not known.
+        Error of |f|. It covers 95 % of directions; NaN where it is not known.
     error_by : str
-        "extinction", measured inside the body (`creeping.field.currents.whole_body`); "order", the size of what is
-        beyond both orders of each ray and of what is left out; "extrapolated", the same, its level measured against
-        currents at a lower wavenumber (`creeping.field.far`).
+        Source of the error: "extinction", the residual field inside the body (`creeping.field.currents.whole_body`);
+        "order", the size of the terms that the expansions of the rays neglect; "extrapolated", the same, scaled to
+        the error measured against currents at a lower wavenumber (`creeping.field.far`).
     wavenumber : float, 1/L
     boundary : str
     order : int
     measured_at : float, 1/L
-        Wavenumber at which the level of an extrapolated error was measured; else NaN.
+        Wavenumber at which an extrapolated error was measured; else NaN.
     unit : str
-        Of lengths: "m" where the body knows it, else "L".
+        Unit of length: "m" if the body states it, else "L".
     validity : Validity, optional
-        Least k rho and largest kappa_t rho/m^2 on the fan's rays; of `far_field`.
+        Least k rho and largest kappa_t rho/m^2 on the rays of the fan; set by `far_field`.
 
     Raises
     ------
     ValueError
-        If a part is of another shape than the total.
+        If a part and the total differ in shape.
 
     Examples
     --------
@@ -127,17 +127,17 @@ class FarField(Drawn):
 
     @property
     def creeping(self) -> ComplexArray:
-        """What creeping rays shed, L; NaN where the method does not know it apart, as `reflected` and `forward`."""
+        """Contribution shed by creeping rays, L; NaN where the method does not separate it."""
         return self._part("creeping")
 
     @property
     def reflected(self) -> ComplexArray:
-        """What the lit side reflects, L; NaN where it is not known apart."""
+        """Contribution reflected by the lit side, L; NaN where the method does not separate it."""
         return self._part("reflected")
 
     @property
     def forward(self) -> ComplexArray:
-        """The forward lobe, L; NaN where it is not known apart."""
+        """Contribution of the forward lobe, L; NaN where the method does not separate it."""
         return self._part("forward")
 
     def _part(self, name: str) -> ComplexArray:
@@ -145,19 +145,19 @@ class FarField(Drawn):
         return np.full(self.total.shape, complex(np.nan, np.nan)) if known is None else known
 
     def take(self, rows: slice | IntArray) -> FarField:
-        """The field in some of its directions."""
+        """Far field in the directions selected by a slice or by row numbers."""
         parts = {name: values[rows] for name, values in self.parts.items()}
         return replace(self, parts=parts, **{name: getattr(self, name)[rows] for name in BY_DIRECTION})
 
     @staticmethod
     def joined(fields: Sequence[FarField]) -> FarField:
-        """Fields of one kind in the directions of all, one after the other."""
+        """Concatenate far fields of one kind along their directions."""
         parts = {name: np.concatenate([one.parts[name] for one in fields]) for name in fields[0].parts}
         lanes: dict[str, Any] = {n: np.concatenate([getattr(one, n) for one in fields]) for n in BY_DIRECTION}
         return replace(fields[0], parts=parts, **lanes)
 
     def packed(self) -> dict[str, np.ndarray[Any, Any]]:
-        """Arrays of numbers, (m, ...) each, from which `unpacked` makes it again."""
+        """Arrays of numbers (m, ...) for storage; `unpacked` restores the far field from them."""
         names, codes = np.unique(self.method, return_inverse=True)
         words = {name: getattr(self, name) for name in ONE_EACH}
         words |= {"methods": names.tolist(), "validity": None if self.validity is None else list(self.validity)}
@@ -167,7 +167,7 @@ class FarField(Drawn):
 
     @staticmethod
     def unpacked(arrays: dict[str, np.ndarray[Any, Any]]) -> FarField:
-        """The far field of arrays, of m directions as of `packed`: fields (m,) or (m, 2, 2), L."""
+        """Restore a far field, (m,) or (m, 2, 2), L, from the arrays of `packed`."""
         words = json.loads(bytes(arrays["words"]))
         names, validity = words.pop("methods"), words.pop("validity")
         words["validity"] = None if validity is None else Validity(*validity)
@@ -182,24 +182,24 @@ class FarField(Drawn):
 
     @property
     def dbsm(self) -> FloatArray:
-        """Radar cross section 10 log10(4π|f|²), dB relative to a square metre if L is the metre: as ``total``."""
+        """Radar cross section 10 log10(4π|f|²), dB relative to L² (dBsm if L is the metre), shaped as ``total``."""
         return cross_section_decibels(self.total)
 
     @property
     def target_strength(self) -> FloatArray:
-        """Target strength 20 log10 |f|, dB relative to a metre if L is the metre, as of sonar: as ``total``."""
+        """Sonar target strength 20 log10 |f|, dB relative to L (a metre if L is one), shaped as ``total``."""
         return decibels(self.total)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Amplitudes, parts, error and cross section with names on their axes: an ``xarray.Dataset``.
+        """``xarray.Dataset`` of amplitudes, parts, error and cross section.
 
-        Dimensions are ``direction``, of a conductor ``scattered`` and ``incident`` too, "theta" and "phi"; coordinates
-        ``vector``, ``azimuth`` and ``elevation`` (degrees) of the directions.
+        The dimension is ``direction``; a conductor has ``scattered`` and ``incident`` too, with "theta" and "phi".
+        Coordinates of the directions are ``vector``, and ``azimuth`` and ``elevation`` in degrees.
         """
         return far_dataset(self)
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """The same as a ``pandas.DataFrame``, one row for each direction, of a conductor for each component of it."""
+        """Contents of `to_xarray` as a ``pandas.DataFrame``: one row per direction and, for a conductor, component."""
         return self.to_xarray().drop_vars("vector").drop_dims("axis", errors="ignore").to_dataframe()
 
     def __repr__(self) -> str:
@@ -231,14 +231,14 @@ class FarField(Drawn):
 
     @property
     def error_source(self) -> str:
-        """What the error comes from, in words."""
+        """Source of the error in words."""
         if self.error_by == "extrapolated":
             return f"extrapolation from k = {self.measured_at:.3g}"
         return self.error_by
 
     @property
     def stated_error(self) -> tuple[float, float] | None:
-        """Rms and largest of the errors that are known, L; None if none is."""
+        """Rms and maximum of the known errors, L; None if no error is known."""
         known = self.error[np.isfinite(self.error)]
         return (float(np.sqrt(np.mean(known**2))), float(known.max())) if len(known) else None
 

@@ -55,20 +55,20 @@ def wavenumber(value: str | ArrayLike, *, sound_speed: float | None = None) -> f
     Parameters
     ----------
     value : str, float or array of float
-        Frequency in Hz, or text with a unit: a frequency ("10 GHz", "38kHz") or a wavelength ("3 cm"), or a range of
-        either, "first:last:step" with the unit behind the last number, or one behind each.
+        Frequency in Hz, or text with a unit: a frequency ("10 GHz", "38kHz"), a wavelength ("3 cm"), or a range of
+        either, "first:last:step", with one unit at the end or one after each number.
     sound_speed : float, m/s, optional
-        Of the medium; the speed of light if not given.
+        Speed of sound in the medium; by default the speed of light is used.
 
     Returns
     -------
     float, or (n,) of float, 1/m
-        As many as the value has, as an array for an array or a range.
+        One number for one value, an array for an array or a range.
 
     Raises
     ------
     InvalidInputError
-        If the value is not positive and finite, or is no such text.
+        If the value is not positive and finite, or the text cannot be read.
 
     Examples
     --------

@@ -36,20 +36,20 @@ from creeping.geometry.arguments import number_between, positive_number
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ImpulseResponse(Drawn):
-    """A field against delay, (m, ...).
+    """Impulse response h of a field: values at m delays, (m, ...).
 
     Attributes
     ----------
     delay : (m,), L or s
-        Ascending; 0 is the phase 0 of the values: of an incident plane wave when it passes the origin.
+        Ascending. Delay 0 has phase 0 in the input: for a plane wave, the moment at which the wave passes the origin.
     values : (m, ...) complex
-        In the unit of the field; a path that brings a e^{ikt} at all wavenumbers has a at its delay t.
+        In the unit of the field. A path that contributes a e^{ikt} at all wavenumbers gives the value a at delay t.
     error : (...)
-        Bound of the error at any delay by the errors of the field; 0 if none were given.
+        Bound of the error at any delay, from the errors of the field; 0 if none were given.
     resolution : float, L or s
-        Width of a single path at half its height in power.
+        Width of the peak of a single path at half its power.
     period : float, L or s
-        After which delays repeat.
+        Period of the response in delay.
     unit : str
         "L" or "s".
 
@@ -72,7 +72,7 @@ class ImpulseResponse(Drawn):
 
     @property
     def envelope(self) -> FloatArray:
-        """|h| (m, ...)."""
+        """Magnitude |h| (m, ...)."""
         return np.abs(self.values)
 
     def arrivals(self, most: int = 8, *, above: float = 0.05) -> FloatArray:
@@ -81,25 +81,25 @@ class ImpulseResponse(Drawn):
         Parameters
         ----------
         most : int
-            Peaks at most.
+            Largest number of peaks.
         above : float
-            Least height, as a share of the largest; nor are peaks below the error.
+            Least height relative to the highest peak. Peaks below the error are left out too.
 
         Returns
         -------
         (p,), L or s
-            To a share of the resolution: paths that are no further apart than it are not told apart.
+            Delays, accurate to a fraction of ``resolution``. Closer paths merge into one peak.
 
         Raises
         ------
         InvalidInputError
-            If there are several responses.
+            If the object holds several responses.
         """
         from scipy.signal import find_peaks
 
         if self.values.ndim != 1:
             raise InvalidInputError(
-                f"arrivals are of one response, values (m,), not {self.values.shape}; transform them one by one"
+                f"arrivals need one response, values (m,), not {self.values.shape}; transform the fields one by one"
             )
         size = self.envelope
         # periodic: a peak may stand at either end
@@ -130,19 +130,19 @@ def impulse_response(
     start: float | None = None,
     window: str = "hann",
 ) -> ImpulseResponse:
-    """Response of a field to a pulse that fills a band: its envelope has a peak for each path that is told apart.
+    """Response of a field to a pulse that fills the band: each path that the band resolves gives a peak.
 
     Parameters
     ----------
     values : (n, ...) complex, or sequence of results
-        At the wavenumbers: arrays, or `NearField`, `SurfaceField`, `SourcePattern`, whose errors are taken over. Of
-        `Coupling`, whose diagonal is infinite, give ``[c[0, 1] for c in ...]``.
+        Field at each wavenumber: arrays, or `NearField`, `SurfaceField` or `SourcePattern`, whose errors are used.
+        The diagonal of a `Coupling` is infinite, so give single entries, ``[c[0, 1] for c in ...]``.
     wavenumbers : (n,), 1/L
         Ascending, equally spaced, eight or more.
     error : (n, ...), optional
-        Of the values, in their unit; taken from results.
+        Error of the values, in the same unit; by default that of the results.
     speed : float, L/s, optional
-        Of the wave: delays are in seconds then, else lengths of paths, L.
+        Speed of the wave. If given, delays are in seconds; otherwise they are path lengths, L.
     start : float, L or s, optional
         First delay; by default minus half of the period 2 pi/dk.
     window : {"hann", "taylor", "none"}
@@ -154,7 +154,7 @@ def impulse_response(
     Raises
     ------
     InvalidInputError
-        If they are not that, or values are not finite.
+        If the wavenumbers are not as described, or values are not finite.
 
     Examples
     --------
@@ -212,11 +212,11 @@ class RangeProfile(Drawn):
     Attributes
     ----------
     range : (m,), L
-        Ascending; of the plane d.x = R through the origin at 0.
+        Ascending; distance R along d of the plane d.x = R, 0 at the origin.
     values : (m,) complex, L
         An isolated echo of amplitude f has this value at its range.
     resolution : float, L
-        Width of a single echo at half its height in power.
+        Width of the peak of a single echo at half its power.
 
     Examples
     --------
@@ -252,7 +252,7 @@ def range_profile(field: ArrayLike, wavenumbers: ArrayLike, *, window: str = "ha
     Raises
     ------
     InvalidInputError
-        If they are not that.
+        If the wavenumbers are not as described.
 
     Examples
     --------

@@ -53,7 +53,7 @@ def _of_values(name: str) -> Callable[..., Any]:
     def method(self: "ArrayResult", *args: Any, **options: Any) -> Any:
         return getattr(self.values, name)(*args, **options)
 
-    method.__name__, method.__doc__ = name, f"As `numpy.ndarray.{name}` of the values."
+    method.__name__, method.__doc__ = name, f"Apply `numpy.ndarray.{name}` to the values."
     return method
 
 
@@ -63,7 +63,7 @@ def _not_in_place(self: "ArrayResult", other: Any) -> Any:
 
 
 class ArrayResult(NDArrayOperatorsMixin):
-    """Base of results whose ``values`` they stand for."""
+    """Base of results that numpy can use in place of their ``values``."""
 
     # no state: results stay frozen dataclasses
     __slots__ = ()
@@ -109,7 +109,7 @@ class ArrayResult(NDArrayOperatorsMixin):
 
     @property
     def ndim(self) -> int:
-        """Number of axes."""
+        """Number of axes of the values."""
         return self.values.ndim
 
     @property
@@ -124,7 +124,7 @@ class ArrayResult(NDArrayOperatorsMixin):
 
     @property
     def real(self) -> FloatArray:
-        """Real parts."""
+        """Real parts of the values."""
         return self.values.real
 
     @property

@@ -82,39 +82,39 @@ def near_field(
     order: int = 2,
     method: str = "auto",
 ) -> NearField:
-    """Total field u at points on or off the body, with its error; it acts as an array.
+    """Total field u and its error at points outside the body or on it.
 
     Parameters
     ----------
     fan : RayFan
-        Long enough to pass where rays leave towards the points.
+        Its rays must be long enough to pass the places where waves leave the body towards the points.
     points : (..., 3), L
         Outside the body or on it.
     wavenumber : float, 1/L
     boundary : "soft", "hard" or ImpedanceBoundary
     order : 2 or 1
-        Second-order creeping waves, or the leading order, which is by rays.
+        Order of the creeping waves. Order 1, the leading order, uses sums over rays only.
     method : {"auto", "currents", "rays", "equation"}
-        The currents of the whole body, or the sum over creeping rays, which on the lit side is not the total field
-        (status LIT). "auto" takes, point by point, rays in the shadow where they err less, currents elsewhere, unless
-        these cost more than some forty seconds or the order is 1 (bodies with joints have no rays off them: there
-        currents alone serve). "equation" is as "currents", found by the body's integral equation (`surface_currents`
-        with ``solve=True``). Nearer to the body than a quarter of a wavelength "layer" stands for currents: what is
-        between them and the field on the body (`creeping.field.near`). Where that has no foot, over bays or
-        ground without rays, rays serve.
+        "currents" radiates the currents of the whole body. "rays" sums over creeping rays; on the lit side this is
+        not the total field (status LIT). "auto" uses rays at shadow points where their error is smaller, and currents
+        elsewhere if they take less than about forty seconds and the order is 2. A body with joints always uses
+        currents off its surface. "equation" uses currents from the integral equation (`surface_currents` with
+        ``solve=True``). Closer to the body than a quarter of a wavelength the field is interpolated between the
+        currents' field and the field on the body ("layer", see `creeping.field.near`), or taken from rays where the
+        surface below has no usable field, e.g. in a concave region.
 
     Returns
     -------
     NearField
-        In units of the incident wave; ``method`` names the method used at each point.
+        In units of the incident wave; usable as the array of its values. ``method`` names the method at each point.
 
     Raises
     ------
     InvalidInputError
         On points inside the body or not finite, a bad wavenumber, boundary, order or method, for a weighted body or one
-        with edges, and if the equation is asked for of a body that is rough or needs too many nodes.
+        with edges, or if method="equation" and the body is rough or needs too many nodes.
     SurfaceError
-        If currents are asked for and the wavenumber is too high for any mesh of the body.
+        If currents are requested and the wavenumber is too high for any mesh of the body.
 
     Examples
     --------

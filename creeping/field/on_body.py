@@ -79,7 +79,7 @@ def surface_field(
     order: int = 2,
     method: str = "auto",
 ) -> SurfaceField:
-    """Field on the body: u, or du/dn (1/L) of the soft boundary, with its error; it acts as an array.
+    """Field on the body and its error: u, or du/dn (1/L) on a soft boundary.
 
     Parameters
     ----------
@@ -90,26 +90,27 @@ def surface_field(
     boundary : "soft", "hard" or ImpedanceBoundary
     order : 2 or 1
     method : {"auto", "equation"}
-        At points, whether rays and the lit side's expansion serve where they can, or the solution of the body's
-        integral equation everywhere (`surface_currents` with ``solve=True``).
+        With points: "auto" uses rays and the lit side's expansion where they apply; "equation" uses the solution of
+        the integral equation everywhere (`surface_currents` with ``solve=True``).
 
     Returns
     -------
     SurfaceField
-        Of shape (rays, steps): each ray's own contribution, by creeping modes up to where the ray detaches and
-        by marching beyond (``method``; not for a point source, whose incident wave is e^{ikR}/(4 pi R)),
-        infinite at its caustics (status CAUSTIC); 0 where it has ended otherwise (DETACHED) or was never
-        launched by the wave (NO_RAY). With points (...): the total field; all rays through each of them summed
-        in the shadow, 0 where none passes (NO_RAY or TRUNCATED); by creeping modes or by marching and beams
-        (``method``), whichever errs less: these go on across caustics and where rays have ended.
+        Usable as the array of its values. Without points, of shape (rays, steps): the contribution of each ray alone.
+        Creeping modes give it up to detachment and marching beyond; the fan of a point source, whose incident wave is
+        e^{ikR}/(4 pi R), has modes only. It is infinite at caustics of the ray (status CAUSTIC), and 0 after the ray
+        has ended (DETACHED) or if the wave did not launch the ray (NO_RAY). With points (...): the total field. In
+        the shadow it is the sum over all rays through a point, or 0 if no ray passes (NO_RAY or TRUNCATED). Creeping
+        modes or marching with beams are used, whichever has the smaller error (``method``); marching continues across
+        caustics and beyond detachment.
 
     Raises
     ------
     InvalidInputError
-        On bad points, wavenumber, boundary, order or method, for a weighted body, and at points for the fan of a point
-        source.
+        On bad points, wavenumber, boundary, order or method, for a weighted body, or if points are given for the fan of
+        a point source.
     SurfaceError
-        If the equation is asked for and the wavenumber is too high for any mesh of the body.
+        If method="equation" and the wavenumber is too high for any mesh of the body.
 
     Examples
     --------

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_AWAY = "let currents serve: method='currents', a quarter of a wavelength off the body"
+_AWAY = "use method='currents', a quarter of a wavelength or more off the body"
 WORTH, LEAST_WORTH = 0.5, 0.1
 """Error from which a value is unresolved: both this share of it, and this one of the incident wave."""
 
@@ -35,32 +35,32 @@ Words = np.ndarray[Any, np.dtype[np.str_]]
 
 
 class FieldStatus(IntEnum):
-    """What is to be thought of a field at a point; all but OK stand at values whose error is a mere bound.
+    """Status of the field at a point; where it is not OK, ``error`` is only a bound.
 
     Examples
     --------
     >>> import creeping as cr
     >>> cr.FieldStatus.LIT.name, cr.FieldStatus.LIT.remedy
-    ('LIT', "let currents serve: method='currents', a quarter of a wavelength off the body")
+    ('LIT', "use method='currents', a quarter of a wavelength or more off the body")
     """
 
     OK = 0
     LIT = 1
-    """Creeping rays alone count on the lit side: incident and reflected waves are missing."""
+    """A lit point whose value holds creeping waves only: the incident and reflected waves are missing."""
     CAUSTIC = 2
-    """Rays merge: the sum over them grows without bound towards it."""
+    """Near a caustic, where rays merge and their sum diverges."""
     NO_RAY = 3
-    """In the shadow no creeping ray comes: behind ground that launches none, or where rays have decayed to nothing."""
+    """No creeping ray reaches this shadow point: the shadow line launches none, or the rays have decayed to nothing."""
     DETACHED = 4
-    """A ray that comes here has ended before, over a concave or rough surface, and may have mattered."""
+    """A ray ended on a concave or rough surface before it reached this point, and its contribution may matter."""
     TRUNCATED = 5
-    """The fan ends before its rays could come here."""
+    """The rays of the fan are too short to reach this point."""
     UNRESOLVED = 6
-    """The error, or a bound in its place, is above half the value and above 0.1 of the incident wave."""
+    """The error, or its bound, exceeds half the value and a tenth of the incident wave; or only a bound is known."""
 
     @property
     def remedy(self) -> str:
-        """What to do about it."""
+        """What to do at points of this status."""
         return _REMEDIES[self]
 
 
@@ -68,10 +68,10 @@ _REMEDIES = {
     FieldStatus.OK: "none needed",
     FieldStatus.LIT: _AWAY,
     FieldStatus.CAUSTIC: _AWAY,
-    FieldStatus.NO_RAY: f"{_AWAY}; what no ray brings their error holds",
-    FieldStatus.DETACHED: f"{_AWAY}; what rays that have ended bring no more their error holds",
+    FieldStatus.NO_RAY: f"{_AWAY}; their error includes the missing waves",
+    FieldStatus.DETACHED: f"{_AWAY}; their error includes the waves of rays that ended early",
     FieldStatus.TRUNCATED: "launch longer rays: length= of launch",
-    FieldStatus.UNRESOLVED: "none at this wavenumber but another method=: the value is hardly known beyond its error",
+    FieldStatus.UNRESOLVED: "try another method=; at this wavenumber the error is about as large as the value",
 }
 
 
@@ -86,21 +86,22 @@ def judged(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PointData(Shown):
-    """What every field at points (...) says of itself, in arrays of their shape.
+    """Attributes shared by all fields at points (...); arrays have the shape of the points.
 
     Attributes
     ----------
     points : (..., 3), L
     error : (...)
-        Of the values, in their unit, meant to hold at 95 of 100 points whose status is OK; at others a bound, infinite
-        where the values are.
+        Error of the values, in the same unit. It covers 95 % of the points whose status is OK; elsewhere it is a
+        bound, infinite where the value is infinite.
     error_by : (...) of str
-        What gave its level: "extinction", measured inside the body; "expansion", what the next terms of the expansions
-        are worth; both, joined by "+", in the layer; "bound", no more than what is missing may be.
+        Source of the error estimate: "extinction", the residual field inside the body; "expansion", the size of the
+        next terms of the expansions; both, joined by "+", in the layer near the body; "bound", the largest
+        contribution that may be missing.
     status : (...) of int
         Codes of `FieldStatus`.
     method : (...) of str
-        The method used, joined by "+" where two were blended.
+        Method used at each point; two names joined by "+" where two methods are blended.
     wavenumber : float, 1/L
     boundary : str
     order : int
@@ -128,7 +129,7 @@ class PointData(Shown):
 
     @property
     def status_counts(self) -> dict[str, int]:
-        """Number of points of each status that occurs, by name."""
+        """Number of points by name of status; only statuses that occur."""
         return {s.name: int(np.sum(self.status == s)) for s in FieldStatus if np.any(self.status == s)}
 
     @property
@@ -138,15 +139,15 @@ class PointData(Shown):
 
     @property
     def magnitude(self) -> FloatArray:
-        """Size of what the error is of (...), of the shape of the status."""
+        """Magnitude of the field, in the shape of ``status``."""
         raise NotImplementedError
 
     def to_xarray(self) -> xarray.Dataset:
-        """Values, parts, error and status with names, one row a point: an ``xarray.Dataset``."""
+        """``xarray.Dataset`` of values, parts, error and status, one row per point."""
         raise NotImplementedError
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """The same as a ``pandas.DataFrame``, one row a point."""
+        """Contents of `to_xarray` as a ``pandas.DataFrame``, one row per point."""
         return self.to_xarray().to_dataframe()
 
     def __repr__(self) -> str:
@@ -191,7 +192,7 @@ class PointField(ArrayResult, PointData):
         return np.abs(self.values)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Values, parts, error and status with names, one row a point: an ``xarray.Dataset``."""
+        """``xarray.Dataset`` of values, parts, error and status, one row per point."""
         own = {f.name for f in fields(self)} - {f.name for f in fields(PointField)}
         return point_dataset(self, tuple(sorted(own)))
 
@@ -203,12 +204,13 @@ class NearField(PointField):
     Attributes
     ----------
     points, values, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
-        As of every field at points; ``method`` is "currents", "equation" where the body's integral equation gave them,
-        "layer" between them and the body, "rays", or, where an admittance varies and neither serves, "none"; on the
-        body "lit", "rays", "march" and both with "lit+", "equation", or "boundary", where u = 0.
+        As for every field at points. Off the body ``method`` is "currents", "equation" (currents from the integral
+        equation), "layer" (interpolated between the body and the currents' field, next to the body), "rays", or
+        "none", where the admittance varies and no method applies. On the body it is "lit", "rays", "march",
+        "lit+rays", "lit+march", "equation", or "boundary", where u = 0.
     incident, scattered, creeping : (...) complex
-        Parts, whose sum the values are: where currents were used, or the expansion of the lit side, the incident wave
-        and the rest; where rays did, the sum over them, which in the shadow is the whole field.
+        Parts that add up to the values. Currents and the lit side's expansion give ``incident`` and ``scattered``.
+        Rays give ``creeping``, which in the shadow is the total field.
 
     Examples
     --------
@@ -235,12 +237,11 @@ class SurfaceField(PointField):
     Attributes
     ----------
     points, values, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
-        As of every field at points; ``method`` is "lit", "rays" (creeping modes), "march" (waves
-        marched along rays, and beams where these merge) or, in the penumbra, "lit+rays" or "lit+march";
-        "equation" where the body's integral equation is solved.
+        As for every field at points. ``method`` is "lit" (the lit side's expansion), "rays" (creeping modes), "march"
+        (waves marched along rays, with beams near caustics), "lit+rays" or "lit+march" in the penumbra, or "equation".
     lit, creeping : (...) complex
-        Parts, whose sum the values are: what the lit side's expansion gives, and creeping rays; of the equation what
-        it is on the lit and on the dark side.
+        Parts that add up to the values: the lit side's expansion, and creeping rays. For "equation": the values on
+        the lit side, and those on the dark side.
 
     Examples
     --------

@@ -43,22 +43,22 @@ N_RAYS = 48
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SourcePattern(ArrayResult, Drawn):
-    """Far fields F of point sources, directions (m,) by sources (s,); it acts as the array of its values.
+    """Far fields F of s point sources in m directions; usable as the array of its values.
 
     Attributes
     ----------
     directions : (m, 3)
     sources : (s, 3), L
     values : (m, s) complex
-        Far field times 4 pi R e^{-ikR}, without unit: of modulus 1 with no body.
+        F: far field times 4 pi R e^{-ikR}, without unit. Without a body |F| = 1.
     error : (m, s)
-        Of the values, meant to hold at 95 of 100 whose status is OK.
+        Error of the values. It covers 95 % of the values whose status is OK.
     error_by : (m, s) of str
     status : (m, s) of int
-        Codes of `FieldStatus`; UNRESOLVED, with the value 0 and a bound for its error, where the plane wave from a
-        direction has no shadow line.
+        Codes of `FieldStatus`. Where the plane wave from a direction has no usable shadow line, the status is
+        UNRESOLVED, the value is 0 and the error is a bound.
     method : (m, s) of str
-        The method used, as of `near_field`.
+        Method used, named as in `near_field`.
     wavenumber : float, 1/L
     boundary : str
     length_unit : str
@@ -91,21 +91,21 @@ class SourcePattern(ArrayResult, Drawn):
 
     @property
     def decibels(self) -> FloatArray:
-        """20 log |F| (m, s), dB re the source with no body; -inf where F is 0."""
+        """20 log10 |F| (m, s), dB relative to the source without the body; -inf where F is 0."""
         with np.errstate(divide="ignore"):
             return np.asarray(20 * np.log10(np.abs(self.values)))
 
     @property
     def status_counts(self) -> dict[str, int]:
-        """Number of values of each status that occurs, by name."""
+        """Number of values by name of status; only statuses that occur."""
         return {s.name: int(np.sum(self.status == s)) for s in FieldStatus if np.any(self.status == s)}
 
     def to_xarray(self) -> xarray.Dataset:
-        """Values, error and status with names, by direction and source: an ``xarray.Dataset``."""
+        """``xarray.Dataset`` of values, error and status, by direction and source."""
         return pattern_dataset(self)
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """The same as a ``pandas.DataFrame``, one row a direction and source."""
+        """Contents of `to_xarray` as a ``pandas.DataFrame``, one row per direction and source."""
         return self.to_xarray().drop_dims("axis").to_dataframe()
 
     def __repr__(self) -> str:
@@ -129,26 +129,26 @@ def source_pattern(
     boundary: BoundaryLike = "hard",
     n_rays: int = N_RAYS,
 ) -> SourcePattern:
-    """Far fields of point sources on a body or near it; or what points there receive of plane waves from afar.
+    """Far fields of point sources on a body or near it; by reciprocity also the reception of plane waves there.
 
     Parameters
     ----------
     flow : PhaseMap or DirectFlow
         Of a body without edges.
     sources : (s, 3), L
-        Outside the body or on it, one point (3,) alike.
+        Positions outside the body or on it; a single point may be (3,).
     directions : (m, 3)
-        Towards the observers: where received plane waves come from.
+        Directions towards the observers, from which received plane waves come.
     wavenumber : float, 1/L
     boundary : "soft", "hard" or ImpedanceBoundary
         A source on a soft body radiates nothing.
     n_rays : int
-        Rays of each direction's incidence.
+        Number of rays for each direction.
 
     Returns
     -------
     SourcePattern
-        Head-related transfer functions are such values with the ears for sources. A direction takes about 0.2 s at
+        With the ears as sources, the values are head-related transfer functions. Each direction takes about 0.2 s at
         ka = 30 and 0.6 s at ka = 100.
 
     Raises

@@ -17,28 +17,29 @@ from creeping.rays.uncertain_body import coarse_factor, coarse_fan
 def far_field_uncertainty(
     fan: RayFan, observation: ArrayLike, *, wavenumber: float, boundary: BoundaryLike = "soft", order: int = 2
 ) -> FloatArray | None:
-    """Change of the far field when the body is replaced by its second fit, the shadow line and rays anew.
+    """Change of the far field when the body is replaced by its second fit (`coarse_fit`).
 
-    It is about the error of the field of the worse fit: where that is the second, on a coarser grid that resolves the
-    body, two to four times that of the fan's own; of a subdivided mesh, whose ``coarse_factor`` it is multiplied by,
-    the fan's. Nothing is said of the error of the asymptotic method.
+    Shadow line and rays are computed again on the second fit. The change is about the error of the less accurate fit.
+    Where the second fit uses a coarser grid that resolves the body, it is two to four times the error of the fan's
+    field. For a subdivided mesh it is multiplied by ``coarse_factor`` and is about the error of the fan's field. The
+    error of the asymptotic method is not included.
 
     Parameters
     ----------
     fan : RayFan
         Of a body from a file; see `creeping.rays.uncertain_body`.
     observation, wavenumber, boundary, order
-        As of `far_field`.
+        As for `far_field`.
 
     Returns
     -------
     (m,) or (m, 2, 2), L, or None
-        |f - f on the second fit|, times that factor; None for a body that is known exactly.
+        |f - f on the second fit| times ``coarse_factor``; None for a body that is known exactly.
 
     Raises
     ------
     InvalidInputError
-        As `far_field`.
+        For the reasons given at `far_field`.
 
     Examples
     --------

@@ -41,7 +41,7 @@ WITHIN, EDGE = (10.0, 1.0), (4.0, 2.0)
 
 
 class Validity(NamedTuple):
-    """Least k rho and largest |kappa_t| rho/m^2, without unit; NaN of a fan without rays.
+    """Least k rho and largest |kappa_t| rho/m^2 on the rays of a fan, without unit; NaN if there are no rays.
 
     Examples
     --------

@@ -16,7 +16,7 @@ from creeping.geometry.surface import Surface
 
 @dataclass(frozen=True, repr=False)
 class DirectFlow(Shown):
-    """The flow by direct integration, with the protocol of a phase map (apply, flow, transport, horizon, error).
+    """Geodesic flow by direct integration, with the interface of a phase map (apply, flow, transport, horizon, error).
 
     Parameters
     ----------
@@ -24,11 +24,11 @@ class DirectFlow(Shown):
     rtol : float
         Relative tolerance per step; the step adapts to the worst of 64 rays.
     horizon : float, L (travel time for a weighted body)
-        Time of one `apply`.
+        Time by which `apply` advances.
     step : float, optional, L (travel time for a weighted body)
-        Longest of equal steps, taken instead of adapted ones: faster where the body is as curved everywhere.
+        Largest length of equal steps, used instead of adaptive steps; faster on a body of nearly uniform curvature.
     error : ErrorEstimate, optional
-        At the end of rays, if `choose_flow` has measured it.
+        Error at the end of the rays, if `choose_flow` measured it.
 
     Raises
     ------
@@ -97,9 +97,10 @@ class DirectFlow(Shown):
         return unpack(self.transport(states, values), shape, scalar)
 
     def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
-        """Advance states (n, 6, 10 or 12) to ascending times (m,), L: (n, m, the same); see `PhaseMap.transport`.
+        """Advance states (n, c), c = 6, 10 or 12, to ascending times (m,), L: (n, m, c), see `PhaseMap.transport`.
 
-        On a body with creases 14 components tell the ends of rays (`creeping.geodesics.pieces`).
+        On a piecewise smooth body c may be 14. The last two components are then the time at which the ray ended, inf
+        before, and the number of the crease there, -1 before (`creeping.geodesics.pieces`).
         """
         states, times = checked_states(states), as_times(times)[0]
         if is_piecewise(self.body):

@@ -94,7 +94,7 @@ def fibonacci_directions(n: int) -> FloatArray:
     Raises
     ------
     InvalidInputError
-        If n is none of these.
+        If n is not a whole number in this range.
 
     Examples
     --------

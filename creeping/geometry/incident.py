@@ -35,7 +35,7 @@ class PlaneWave:
     Parameters
     ----------
     direction : (3,)
-        Where it travels; need not be unit.
+        Direction of travel; need not be unit.
 
     Attributes
     ----------
@@ -61,13 +61,13 @@ class PlaneWave:
         object.__setattr__(self, "direction", (x, y, z))
 
     def row(self, body: Surface | None = None) -> FloatArray:
-        """(d, w) as kernels take it: (4,)."""
+        """Homogeneous coordinates (d, 0) of the wave for the compiled kernels: (4,)."""
         return np.array([*self.direction, 0.0])
 
 
 @dataclass(frozen=True, init=False)
 class PointSource:
-    """A point source e^{ikR}/(4 pi R), R the distance from it.
+    """A point source e^{ikR}/(4 pi R), where R is the distance from the source.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ class PointSource:
         object.__setattr__(self, "position", (x, y, z))
 
     def row(self, body: Surface | None = None) -> FloatArray:
-        """(d, w) as kernels take it, |q| about 1 on the body: (4,)."""
+        """Homogeneous coordinates (d, w) of the source for the compiled kernels, |q| about 1 on the body: (4,)."""
         x = np.array(self.position)
         if body is None:
             return np.array([*-x, 1.0])

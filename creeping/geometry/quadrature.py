@@ -159,7 +159,7 @@ def body_nodes(body: Surface, rate: float) -> BodyNodes:
     found.cells = 0
     raise SurfaceError(
         f"no mesh of up to {MOST_CELLS} cells or {MOST_NODES} nodes integrates over the body, which is too thin or too "
-        "sharp; its fields go by rays"
+        "sharp; use rays for its fields"
     )
 
 

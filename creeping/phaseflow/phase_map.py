@@ -35,17 +35,17 @@ MOST_LEAPS = 1e5
 
 @dataclass(frozen=True)
 class ErrorGrowth:
-    """Error of composed maps against the length of the ray, measured against direct integration.
+    """Error of composed maps as a function of ray length, measured against direct integration.
 
     Attributes
     ----------
     lengths : tuple of float, L (travel time for a weighted body)
         Ascending.
     rms, max : tuple of float
-        As in `ErrorEstimate`, at each length.
+        Errors at each length, as defined in `ErrorEstimate`.
     bound : float
-        Of the rms at the last length, two standard errors of its square above it: where few rays carry most of the
-        error, as beside an unstable geodesic, samples scatter.
+        Upper bound of the rms at the last length: its square lies two standard errors above the measured square. Near
+        an unstable geodesic few rays carry most of the error, and the measured rms scatters.
 
     Examples
     --------
@@ -61,12 +61,12 @@ class ErrorGrowth:
     bound: float
 
     def rms_after(self, length: float) -> float:
-        """Rms error after a length, L, by interpolation in logarithms; beyond the last one by its last slope.
+        """Rms error at a length, L, interpolated logarithmically; beyond the last length it grows exponentially.
 
         Raises
         ------
         InvalidInputError
-            If the length is no number >= 0.
+            If the length is not a number >= 0.
         """
         length = real_number(length, "length")
         if not length >= 0:
@@ -82,12 +82,12 @@ class ErrorGrowth:
         return float(np.exp(np.interp(at, t, e)))
 
     def trusted_length(self, tolerance: float) -> float:
-        """Longest length, L, at most twice the measured one, whose rms error, extrapolated, meets the tolerance.
+        """Largest length, L, whose rms error meets the tolerance; extrapolates to at most twice the measured length.
 
         Raises
         ------
         InvalidInputError
-            If the tolerance is no positive finite number.
+            If the tolerance is not a positive finite number.
         """
         tolerance = positive_number(tolerance, "tolerance")
         ends = np.linspace(self.lengths[0], 2 * self.lengths[-1], 2001)
@@ -103,14 +103,14 @@ class PhaseMap(Drawn):
     ----------
     body : Surface
     model : Model
-        Coordinates in which rays are composed.
+        Coordinates in which maps are composed.
     grid : Grid
     leaps : tuple of Leap
-        Maps by ascending time, the last is g_T0; more than one only for ``method="tower"``.
+        Maps by ascending time; the last is g_T0. Only ``method="tower"`` has more than one.
     error : ErrorEstimate
         Of one g_T0, measured when the map was built.
     growth : ErrorGrowth or None
-        Error after longer and longer rays.
+        Error as a function of ray length.
     parameters : dict
         How the map was built.
 
@@ -154,7 +154,7 @@ class PhaseMap(Drawn):
 
     @property
     def has_jacobi(self) -> bool:
-        """Whether it carries the Jacobi matrix, as fans need it to."""
+        """Whether the map carries the Jacobi matrix, which fans need."""
         return self.leaps[-1].has_jacobi
 
     def __repr__(self) -> str:
@@ -214,16 +214,16 @@ class PhaseMap(Drawn):
         return unpack(self._transported(states, values), shape, scalar)
 
     def transport(self, states: FloatArray, times: FloatArray) -> FloatArray:
-        """Advance states (n, 6, 10 or 12) to the ascending times (m,), L: (n, m, the same).
+        """Advance states (n, c), c = 6, 10 or 12, to ascending times (m,), L: (n, m, c).
 
-        Components 0 to 5 are x, L, and p; 6 to 9 the columns of the Jacobi matrix of the metric ds/c, whose M12 is a
-        time and M21 1/time; 10 and 11 the attenuation integral, L^(1/3), and the time of detachment (`attenuation`; inf
-        before).
+        Components 0 to 5 are x, L, and p. Components 6 to 9 are the columns of the Jacobi matrix of the metric ds/c;
+        M12 is a time, M21 is 1/time. Component 10 is the attenuation integral, L^(1/3). Component 11 is the time of
+        detachment, inf before (`attenuation`).
 
         Raises
         ------
         InvalidInputError
-            If the states carry a Jacobi matrix and the map does not.
+            If the states include a Jacobi matrix and the map does not carry one.
         """
         return self._transported(checked_states(states), as_times(times)[0])
 
@@ -257,7 +257,7 @@ class PhaseMap(Drawn):
         return out
 
     def attenuates_at(self, times: FloatArray) -> bool:
-        """Whether the map itself carries the attenuation to the times (m,), L: multiples of its horizon."""
+        """Whether all times (m,), L, are multiples of the horizon and the map stores the attenuation there."""
         leaps = times / self.horizon
         return self.leaps[-1].has_curvature and bool(np.all(np.abs(leaps - np.round(leaps)) < 1e-11 * (1 + leaps)))
 
@@ -297,12 +297,12 @@ class PhaseMap(Drawn):
         return float(np.clip(1e-3 * self.error.rms, 1e-12, 1e-9)) if np.isfinite(self.error.rms) else 1e-12
 
     def leap(self, states: FloatArray, count: int, level: Leap | None = None) -> FloatArray:
-        """Compose one map (g_T0 by default) ``count`` times on states (n, 6 or 10), units as of `transport`.
+        """Compose one map (g_T0 by default) ``count`` times on states (n, 6 or 10); units are those of `transport`.
 
         Raises
         ------
         InvalidInputError
-            If ``count`` is negative, or the states carry more than the map does.
+            If ``count`` is negative, or the states have components that the map does not carry.
         """
         count = whole_number(count, "count", 0)
         states = checked_states(states).copy()

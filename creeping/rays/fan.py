@@ -51,9 +51,9 @@ CHECKED_RAYS = 16
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RayFan(DrawnOnBody):
-    """Creeping rays of one incidence, all at the same travel times.
+    """Creeping rays of one incidence, sampled at common travel times.
 
-    Rays of one arc of the shadow line are consecutive and in its order.
+    Rays that start on one arc of the shadow line are consecutive, in their order along the arc.
 
     Attributes
     ----------
@@ -61,30 +61,31 @@ class RayFan(DrawnOnBody):
     points, directions : (rays, steps, 3), L and 1
     travel_time : (steps,), L (time for a weighted body)
     eikonal : (rays, steps), L
-        d.x0 + travel_time; of a point source its distance from x0 + travel_time.
+        Phase over k: d.x0 + travel_time, where x0 is the launch point. For a point source the distance from the source
+        to x0 takes the place of d.x0.
     spreading, spreading_rate : (rays, steps), 1 and 1/L
-        J and J'.
+        J and its derivative J'.
     curvature : (rays, steps), 1/L
         kappa_n.
     attenuation : (rays, steps), L^(1/3)
-        Integral of c max(kappa_n, 0)^(2/3) over travel time; it stays from where the ray detaches.
+        Integral of c max(kappa_n, 0)^(2/3) over travel time; constant after detachment.
     caustic_index : (rays, steps)
-        Zeros of J passed.
+        Number of zeros of J passed so far.
     status : (rays,)
         Codes of `RayStatus`.
     detachment : (rays,), L
-        Travel time at which kappa_n first falls to 0 or the ray comes to a non-smooth region, an edge or a tip, inf
-        if none of these happens. A ray that has come to an edge or a tip stays there.
+        Travel time at which kappa_n first falls to 0 or the ray reaches a non-smooth region, an edge or a tip; inf if
+        none of these happens. A ray that reaches an edge or a tip stays there.
     curve_index, arc_index : (rays,)
-        Curve of the shadow line, and arc: rays of one arc are neighbours; with ``launch_from="all"`` an arc is a curve.
+        Numbers of the curve and of the arc that the ray starts on; with ``launch_from="all"`` each curve is one arc.
     arclength, spacing : (rays,), L
-        Of the launch point along its curve, and the share of the curve that the ray stands for.
+        Arclength of the launch point along its curve, and length of the curve that the ray represents.
     closed_arcs : tuple of bool
-        Whether the first and last ray of each arc are neighbours too.
+        For each arc, whether its first and last ray are neighbours.
     error : ErrorEstimate
-        Of (x, p) at the end, measured on some rays against direct integration.
+        Error of (x, p) at the last step, measured on a sample of rays against direct integration.
     flow : PhaseMap or DirectFlow
-        What carried the rays.
+        Flow that advanced the rays.
 
     Examples
     --------
@@ -121,7 +122,7 @@ class RayFan(DrawnOnBody):
 
     @property
     def flow_error(self) -> ErrorEstimate | None:
-        """Error of one step of the map that carried the rays; None for direct integration."""
+        """Error stated by the flow: of one step of a phase map; for direct integration None unless measured."""
         return self.flow.error
 
     @property
@@ -131,12 +132,12 @@ class RayFan(DrawnOnBody):
 
     @property
     def status_counts(self) -> dict[str, int]:
-        """Number of rays of each status that occurs, by name."""
+        """Number of rays by name of status; only statuses that occur."""
         return {s.name: int(np.sum(self.status == s)) for s in RayStatus if np.any(self.status == s)}
 
     @property
     def largest_gap(self) -> float:
-        """Largest distance of neighbours on their way, L; 0 with fewer than two rays on every arc."""
+        """Largest distance between neighbouring rays at any step, L; 0 if no arc has two rays."""
         widest = 0.0
         for arc, closed in enumerate(self.closed_arcs):
             rays = self.points[self.arc_index == arc]
@@ -148,7 +149,7 @@ class RayFan(DrawnOnBody):
 
     @property
     def launched(self) -> BoolArray:
-        """Whether the wave launched each ray, wherever it ended (rays,)."""
+        """Whether the incident wave launched each ray, even if the ray ended early: (rays,)."""
         return np.isin(self.status, LAUNCHED)
 
     @cached_property
@@ -159,9 +160,9 @@ class RayFan(DrawnOnBody):
 
     @property
     def least_radius(self) -> float:
-        """Least 1/kappa_n, L, where the rays matter most; NaN without rays, or for a weighted body, which has no field.
+        """Least 1/kappa_n, L, on the first part of the rays; NaN without rays, or for a weighted body.
 
-        That is up to xi = 1 at the wavenumber where k rho is 10 at the median of the launch points.
+        The first part is that with xi < 1, at the wavenumber for which k rho is 10 at the median of the launch points.
         """
         if speed_of(self.body) is not None or not np.any(self.launched):
             return float("nan")
@@ -171,7 +172,7 @@ class RayFan(DrawnOnBody):
         return 1 / largest if largest > 0 else float("nan")
 
     def losses(self, wavenumber: float | None = None) -> Losses:
-        """Shares that edges and tips take of the line, the rays and the outline; of ``wavenumber``, as for `launch`."""
+        """Shares of shadow line, rays and outline lost to edges and tips; ``wavenumber`` is that of `launch`."""
         return Losses(self.line.edge_share, _of_rays(self, wavenumber), outline_share(self.line))
 
     def __repr__(self) -> str:
@@ -205,35 +206,38 @@ def launch(
     Parameters
     ----------
     flow : PhaseMap or DirectFlow
-        Of the body of the line.
+        Flow on the same body as the shadow line.
     line : ShadowLine
     length : float or "auto", L (travel time for a weighted body)
-        "auto" is where the wave has died away at ``wavenumber``, whatever the boundary (`creeping.rays.reach`), at most
-        4 body sizes; for a weighted body the time that 1.5 body sizes take.
+        Length of the rays. "auto" ends where the wave at ``wavenumber`` has decayed for any boundary
+        (`creeping.rays.reach`), but at 4 body sizes at most. For a weighted body it is the travel time of 1.5 body
+        sizes.
     wavenumber : float, optional, 1/L
-        Lowest that "auto" is to serve; where the median k rho at the launch points is 10 if not given.
+        Lowest wavenumber for which "auto" must suffice; by default that with a median k rho of 10 at the launch points.
     n_rays : int, optional
-        Rays, shared among the arcs by length; if not given one per point of the line, at most 4096, or 32 an arc, where
-        it has several.
+        Number of rays, distributed over the arcs by length. By default one per point of the line; with
+        several arcs at most 4096 or 32 per arc, whichever is more.
     n_steps : int, optional
-        Equal steps of travel time; 64 or more, enough to count caustics, if not given.
+        Number of equal steps of travel time. By default 64 or more, as many as are needed to count caustics.
     launch_from : {"attached", "all"}
-        "all" launches from occluded and concave points too, as in Figure 6 of Ying and Candes 2006.
+        "attached" launches where the wave grazes a convex, unoccluded part of the line. "all" launches from occluded
+        and concave points too, as in Figure 6 of Ying and Candes 2006.
     max_gap : float, optional
-        Rays are inserted until neighbours stay closer than this, L; 0.1 body sizes if not given, inf for none. Past
-        many caustics it stops at 32 times as many, with edges at a 16th of a gap; `RayFan.largest_gap` tells.
+        Rays are inserted until neighbours stay closer than this, L. By default 0.1 body sizes; inf inserts none.
+        Insertion stops at 32 times as many rays or, next to edges, at a 16th of a gap; `RayFan.largest_gap` gives the
+        gap that remains.
     measured : bool
-        Whether the error at the end is measured.
+        Whether to measure the error at the end of the rays.
 
     Returns
     -------
     RayFan
-        Empty (0 rays) if no point of the line launches.
+        Empty (0 rays) if no point of the line launches a ray.
 
     Raises
     ------
     InvalidInputError
-        If the flow is of another body, or a number is out of range.
+        If flow and line belong to different bodies, or a number is out of range.
 
     Examples
     --------

@@ -41,7 +41,7 @@ POLE_JUMP = np.pi / 2
 
 @dataclass(frozen=True, eq=False, repr=False)
 class IsoPhaseCurve(DrawnOnBody):
-    """One connected curve of a level; a level may have several.
+    """One connected curve of constant travel time or eikonal; a level may have several curves.
 
     Attributes
     ----------
@@ -50,13 +50,13 @@ class IsoPhaseCurve(DrawnOnBody):
     points : (m, 3), L
         In the order of the rays.
     closed : bool
-        Whether the last point is joined to the first.
+        Whether the last point connects to the first.
     parameters : (m, 2)
         (theta, phi) of the points, radians; not unwrapped.
     rays : (m,)
-        The ray of the fan that each point lies on.
+        Number of the ray that each point lies on.
     unit : str
-        Of lengths: "m" where the body knows it, else "L".
+        Unit of length: "m" if the body states it, else "L".
 
     Examples
     --------
@@ -85,7 +85,7 @@ class IsoPhaseCurve(DrawnOnBody):
 
     @property
     def length(self) -> float:
-        """Length of the chords from point to point, L."""
+        """Length of the polyline through the points, L."""
         path = np.concatenate([self.points, self.points[: int(self.closed)]])
         return float(np.sum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
 
@@ -109,14 +109,14 @@ def iso_phase_curves(
     fan : RayFan
     levels : scalar or (m,), L (time for a weighted body)
     of : {"travel_time", "eikonal"}
-        Time since the shadow line (the definition of Ying and Candes 2006), or the phase of the wave.
+        Travel time from the shadow line (the definition of Ying and Candes 2006), or the phase of the wave over k.
     beyond_detachment : bool
-        Whether curves go on where rays are detached: geodesics still, but no creeping rays.
+        Whether to continue curves beyond detachment, where rays are still geodesics but carry no creeping wave.
 
     Returns
     -------
     list of IsoPhaseCurve
-        By level, then by arc. Levels that no two neighbouring rays meet give none.
+        Ordered by level, then by arc. A level that no two neighbouring rays reach gives no curve.
 
     Raises
     ------

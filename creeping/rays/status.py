@@ -6,7 +6,7 @@ from creeping.shadow.status import ATTACHED, CONCAVE, OCCLUDED
 
 
 class RayStatus(IntEnum):
-    """What became of a ray.
+    """Status of a ray: whether it was launched, and where it ended.
 
     Examples
     --------
@@ -25,12 +25,12 @@ class RayStatus(IntEnum):
     STALLED = 4
     """The speed vanishes at the launch point, so the ray does not move and J is not defined (NaN)."""
     NON_SMOOTH = 5
-    """Came at ``RayFan.detachment`` to where the body is not smooth enough, by its own word, or to where no
-    geodesic of its piece goes on; the field ends there."""
+    """Reached, at ``RayFan.detachment``, a region that the body declares non-smooth, or a point at which the geodesic
+    cannot be continued; the field ends there."""
     EDGE = 6
-    """Came at ``RayFan.detachment`` to an edge of the body; what it would give beyond is left out."""
+    """Reached an edge of the body at ``RayFan.detachment``; its contribution beyond is left out."""
     TIP = 7
-    """Came at ``RayFan.detachment`` to a tip of the body; what it would give beyond is left out."""
+    """Reached a tip of the body at ``RayFan.detachment``; its contribution beyond is left out."""
 
 
 LINE_STATUS = {ATTACHED: RayStatus.OK, OCCLUDED: RayStatus.OCCLUDED, CONCAVE: RayStatus.CONCAVE}

@@ -55,7 +55,7 @@ class RayTracer:
         from creeping.rays.kernels.quantities import polynomial_matrix
 
         if speed_of(body) is not None:
-            raise InvalidInputError(f"{body!r} has a speed; the diffracted field is that of a plain body")
+            raise InvalidInputError(f"{body!r} has a speed; diffracted fields need a body without speed")
         self.body, self.length = body, length
         self.steps = max(16, int(np.ceil(length * sharpest_curvature(body) / turn)))
         self.step = length / self.steps

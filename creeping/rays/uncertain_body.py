@@ -30,7 +30,7 @@ RTOL = 1e-10
 
 @dataclass(frozen=True)
 class BodyUncertainty:
-    """Differences at the last steps of rays on a body and on its second fit, times the body's ``coarse_factor``.
+    """Rms differences between rays on a body and on its second fit at their last steps, times ``coarse_factor``.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class BodyUncertainty:
     attenuation : float
         Rms difference of the attenuation integral, L^(1/3).
     rays : int
-        Traced; those that are no creeping rays, or end early on either body, are left out.
+        Number of rays compared; rays that do not creep, or end early on either fit, are left out.
 
     Examples
     --------
@@ -57,18 +57,18 @@ class BodyUncertainty:
 
 
 def body_uncertainty(fan: RayFan, *, n_rays: int = RAYS) -> BodyUncertainty | None:
-    """Estimate how far a fan is off because its body is known only approximately.
+    """Estimate the error of a fan caused by the uncertain shape of its body.
 
     Parameters
     ----------
     fan : RayFan
     n_rays : int
-        How many of its rays are traced again.
+        Number of rays to trace again on the second fit.
 
     Returns
     -------
     BodyUncertainty or None
-        None for a body that is known exactly, and if no ray reaches the end.
+        None if the body is known exactly or no ray reaches the end.
 
     Raises
     ------

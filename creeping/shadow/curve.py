@@ -27,7 +27,7 @@ HALF = 6
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShadowCurve(DrawnOnBody):
-    """One curve of the shadow line, at points equally spaced by arclength; a closed one unless the body has creases.
+    """One curve of the shadow line, at points equally spaced by arclength; open only on a body with creases.
 
     Attributes
     ----------
@@ -35,31 +35,30 @@ class ShadowCurve(DrawnOnBody):
     wave : (3,) or (4,)
         d of a plane wave, or the row (d, w) of `creeping.geometry.incident`.
     points : (n, 3), L
-        The last is one spacing before the first; of an open curve the first and the last are its ends.
+        On a closed curve the last point is one spacing before the first; on an open curve both are the ends.
     normals, tangents : (n, 3)
         n and T; seen from outside, the lit side is on the left of T.
     arclength : (n,), L
         From 0, growing along T.
     length : float, L
     error : float
-        Estimated relative error of the length, and so of places along the curve.
+        Estimated relative error of the length and of positions along the curve.
     status : (n,) of str
-        "attached", "occluded" (the incident ray is stopped before) or "concave" (kappa_n <= 0
-        along the wave).
+        "attached", "occluded" (the body blocks the incident ray before this point) or "concave" (kappa_n <= 0 along the
+        wave).
     curvature : (n,), 1/L
         kappa_n along the wave.
     arcs : tuple of (start, end, status)
-        Arclengths at which the status changes; the end passes the length where an arc wraps.
+        Arclengths at which the status changes; the end exceeds the length if the arc wraps around.
     nodes : (k, 3), L
-        Equally spaced points that the curve was found by.
+        Equally spaced points from which the curve is interpolated.
     closed : bool
     piece : int
-        Number of the piece that it lies on, of a body with creases; else -1.
+        Number of the piece on which the curve lies; -1 on a smooth body.
     creases : tuple of int
-        Of an open curve, the creases at its start and at its end.
+        For an open curve, numbers of the creases at its start and end.
     goes_on : tuple of int
-        Of an open curve, the curves that go on from its start and from its end beyond a joint, by their numbers in
-        the line; -1 where none does.
+        For an open curve, numbers of the curves that continue it across a joint at its start and end; -1 for none.
     """
 
     body: Surface

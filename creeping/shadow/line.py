@@ -50,17 +50,18 @@ class ShadowLine(DrawnOnBody):
     curves : tuple of ShadowCurve
         Longest first.
     singular_distance : float
-        Least |n.d| at critical points of n.d on the body apart from n = +-d, inf if there are none; also, to first
-        order, the angle from d to the next direction whose shadow line crosses itself. Of a point source the same with
-        the unit vector from it for d, and within one body size of the body at most its height, in body sizes.
+        Least |n.d| at critical points of n.d on the body other than n = +-d; inf if there are none. To first order
+        it is the angle from d to the nearest direction whose shadow line crosses itself. For a point source d is the
+        unit vector from the source; a source within one body size of the body also limits the value to its height
+        above the body, in body sizes.
     nodes : LineNodes
-        What the line was found by.
+        Points from which the curves are interpolated.
     on_edges : tuple of EdgePart
-        Of a body with creases: where the line goes on along edges, which launch no creeping rays.
+        Parts of the line that run along edges, which launch no creeping rays.
     at_tips : float, L
-        Length next to tips, and where the line turns too sharply to be followed, that launches none.
+        Length of the parts that launch no rays because they lie next to tips or turn too sharply to be traced.
     edge_on : tuple of int
-        Pieces all over which n.d = 0: they have no line of their own, and count as dark.
+        Numbers of the pieces on which n.d = 0 everywhere. They have no shadow line and count as dark.
 
     Examples
     --------
@@ -82,35 +83,35 @@ class ShadowLine(DrawnOnBody):
 
     @property
     def direction(self) -> FloatArray:
-        """Unit vector (3,) along which a plane wave travels; a point source has no such."""
+        """Unit vector (3,) along which the plane wave travels; an error for a point source."""
         return plane_direction(self.source, "this shadow line")
 
     @property
     def wave(self) -> FloatArray:
-        """Row (d, w) of `creeping.geometry.incident`: (4,)."""
+        """Homogeneous coordinates (d, w) of the source, see `creeping.geometry.incident`: (4,)."""
         return self.source.row(self.body)
 
     @property
     def length(self) -> float:
-        """Length of all curves, L; parts on edges and next to tips apart."""
+        """Length of all curves, L, without the parts on edges and next to tips."""
         return self.nodes.length
 
     @property
     def edge_share(self) -> float:
-        """Share of the line, its parts on edges and next to tips among it, that they are; 0 of a smooth body."""
+        """Share of the whole line that lies on edges or next to tips; 0 for a smooth body."""
         lost = sum(part.length for part in self.on_edges) + self.at_tips
         return lost / (self.length + lost) if lost else 0.0
 
     @property
     def fractions(self) -> dict[str, float]:
-        """Share of the whole length with each status."""
+        """Share of the length of all curves, by status."""
         length = sum(curve.length for curve in self.curves) or 1.0
         return {
             status: sum(curve.fractions[status] * curve.length for curve in self.curves) / length for status in STATUSES
         }
 
     def arcs(self, launch_from: str = "attached") -> list[Arc]:
-        """Arcs that launch rays: the attached ones, or with "all" each whole curve."""
+        """Arcs that launch rays: the attached arcs or, with "all", every curve as a whole."""
         checked_launch_from(launch_from)
         if launch_from == "all":
             return [Arc(number, 0.0, curve.length, curve.closed) for number, curve in enumerate(self.curves)]
@@ -122,7 +123,7 @@ class ShadowLine(DrawnOnBody):
         ]
 
     def launch_points(self, n_rays: int, launch_from: str = "attached") -> LaunchPoints:
-        """So many launch points on the arcs, as `shadow_lines` gives them: n is 1."""
+        """The given number of launch points on the arcs, in the form that `shadow_lines` returns for one incidence."""
         checked_launch_from(launch_from)
         n_rays = whole_number(n_rays, "n_rays", 0)
         within_budget(400.0 * n_rays, f"{n_rays} rays", "ask for fewer")
@@ -165,9 +166,9 @@ def shadow_line(
     body : Surface
         Only ``level``, ``gradient``, ``hessian`` and ``bounds`` are used.
     direction : (3,)
-        Where a plane wave travels; need not be unit.
+        Direction of travel of a plane wave; need not be unit.
     source : PointSource or PlaneWave
-        In place of a direction; a point source outside the body, which is smooth.
+        Use in place of a direction. A point source must be outside a smooth body.
     n_points : int
         Points on each curve, at least 16; lengths and arcs do not depend on it.
 
@@ -178,11 +179,11 @@ def shadow_line(
     Raises
     ------
     InvalidInputError
-        If the direction, the source or n_points is not usable: a source inside the body or on it among them.
+        If the direction, the source or n_points is not usable, e.g. a source inside the body or on it.
     SurfaceError
         If F = 0 has no closed triangulation in its bounds.
     SingularIncidenceError
-        If the line crosses itself, or so nearly that its curves cannot be told apart.
+        If the line crosses itself, or comes so close to it that its curves cannot be separated.
 
     Examples
     --------
@@ -236,8 +237,8 @@ def _checked_height(body: Surface, source: PointSource) -> None:
     if height <= NEAREST * unit:
         where = "inside the body or on it" if height <= 0 else f"{height / unit:.1e} body sizes above it"
         raise InvalidInputError(
-            f"{source!r} is {where}: of a source there no rays attach; it must be {NEAREST:g} sizes above. "
-            "creeping.source_pattern gives the far field of sources on the body, creeping.coupling what passes along it"
+            f"{source!r} is {where}, where it launches no creeping rays; put it {NEAREST:g} sizes above. "
+            "creeping.source_pattern gives the far field of sources on the body, creeping.coupling fields between them"
         )
 
 

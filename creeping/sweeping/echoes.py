@@ -62,7 +62,7 @@ def backscatter(
     rows: Told | None = None,
     progress: Progress | bool | None = None,
 ) -> xarray.Dataset:
-    """Field in the direction of the radar, for each of its angles and wavenumbers.
+    """Backscattered far field for each angle of the radar and each wavenumber.
 
     Parameters
     ----------
@@ -70,35 +70,35 @@ def backscatter(
     wavenumbers : float or (k,), 1/L
         See `creeping.wavenumber` for frequencies.
     azimuth, elevation : float or (n,), degrees
-        Where the radar is, as seen from the body; one may be a number.
+        Position of the radar, seen from the body; one of the two may be a single number.
     boundary : "pec", "soft", "hard" or ImpedanceBoundary
     method : {"auto", "rays", "currents", "equation", "t-matrix"}
-        As of `creeping.sweep_directions`: "auto" takes currents where rays leave a value unresolved and err more, and
-        the integral equation of a body with edges, joints or tips, or its T-matrix where that is quicker for so many
-        angles: there, and where parts are more curved than rays allow.
+        As for `creeping.sweep_directions`. "auto" uses rays, and currents where rays leave a value unresolved and have
+        the larger error. For a body that has edges, joints or tips, or parts too sharply curved for rays, it uses the
+        integral equation, or the T-matrix if that is faster for the number of angles.
     n_rays : int
-        Rays of an incidence.
+        Number of rays per incidence.
     cache : bool
-        Whether a phase map is kept for the next run.
+        Whether to cache the phase map for later runs.
     store : path, optional
-        Folder in which values are stored as they come.
+        Folder in which values are stored as they are computed.
     resume : bool
-        Go on with a store that exists.
+        Continue an existing store.
     rows : callable, optional
-        With a store: called now and then with the `creeping.sweeping.blocks.Rows` that are there.
+        With a store: called from time to time with the `creeping.sweeping.blocks.Rows` computed so far.
     progress : callable or bool, optional
-        True shows a bar. Or called as ``progress(done, total, seconds)``, as by `creeping.sweep_directions`.
+        True shows a bar. A callable is called as ``progress(done, total, seconds)``, see `creeping.sweep_directions`.
 
     Returns
     -------
     xarray.Dataset
-        As of `creeping.sweep_directions`, with coordinates ``azimuth`` and ``elevation`` of the incidences in degrees;
-        ``dataset.field`` has totals, decibels and polarisations.
+        As from `creeping.sweep_directions`, with coordinates ``azimuth`` and ``elevation`` of the radar in degrees.
+        ``dataset.field`` gives totals, decibels and polarisations.
 
     Raises
     ------
     CreepingError
-        On bad input, or where the sweep fails.
+        On bad input, or if the sweep fails.
 
     Examples
     --------
@@ -130,26 +130,26 @@ def bistatic(
     rows: Told | None = None,
     progress: Progress | bool | None = None,
 ) -> xarray.Dataset:
-    """Field towards observers around the body, for one incidence.
+    """Far field towards observers around the body, for one incidence.
 
     Parameters
     ----------
     incidence : (azimuth, elevation), degrees
-        Where the radar is, as seen from the body: the wave travels in the opposite direction.
+        Position of the radar, seen from the body. The wave travels in the opposite direction.
     azimuth, elevation : float or (m,), degrees
-        Where the observers are, as seen from the body.
+        Positions of the observers, seen from the body.
     body, wavenumbers, boundary, method, n_rays, cache, store, resume, rows, progress
-        As of `backscatter`.
+        As for `backscatter`.
 
     Returns
     -------
     xarray.Dataset
-        As of `creeping.sweep_directions`, with coordinates ``azimuth`` and ``elevation`` of the observers in degrees.
+        As from `creeping.sweep_directions`, with coordinates ``azimuth`` and ``elevation`` of the observers in degrees.
 
     Raises
     ------
     CreepingError
-        On bad input, or where the sweep fails.
+        On bad input, or if the sweep fails.
 
     Examples
     --------

@@ -72,61 +72,62 @@ def sweep_directions(
     Parameters
     ----------
     flow : PhaseMap or DirectFlow
-        Or a body that has no rays, on facets or of several: its fields are solved for.
+        Or a body without rays, i.e. `Facets` or `Bodies`, whose fields come from the integral equation.
     directions : (n, 3)
         Directions of incidence, where the waves travel; need not be unit.
     wavenumbers : float or (k,), 1/L
-        Of the fields.
+        Wavenumbers of the fields.
     quantity : {"monostatic", "bistatic", "rays"}
-        Field in the direction the wave came from, field in the directions ``observation``, or the rays themselves.
-        Every quantity has the shadow line: curves, length, shares.
+        "monostatic": field back towards the source. "bistatic": field in the directions ``observation``. "rays": the
+        rays themselves. All results include data of the shadow line: curves, length, shares.
     observation : (m, 3), optional
-        Directions of "bistatic".
+        Directions of observation for "bistatic".
     boundary : {"soft", "hard", "pec"}, ImpedanceBoundary or a list of them
-        "soft" if not given.
+        By default "soft".
     length : float or "auto", L (travel time for a weighted body)
-        Of the rays. "auto" is one number for all incidences, kept with the results: where waves have died away at the
-        lowest of the wavenumbers, on whichever of twelve incidences that takes longest; see `creeping.launch`.
+        Length of the rays. "auto" is one length for all incidences, stored with the results: the length after which
+        waves at the lowest wavenumber have decayed, the largest of twelve incidences; see `creeping.launch`.
     n_rays : int
-        Rays of an incidence.
+        Number of rays per incidence.
     n_steps : int
-        Points kept of each ray of "rays".
+        Number of points stored per ray for "rays".
     order : 2 or 1
-        Of the creeping waves.
+        Order of the creeping waves.
     method : {"rays", "auto", "currents", "equation", "t-matrix"}
-        Of the fields, "rays" if not given. "auto" computes an incidence again by the currents of the whole body where
-        isolated rays leave a direction unresolved, a tenth of a second or so for each boundary and wavenumber,
-        "currents" every one that a mesh of the body resolves: ``by_currents`` says which. "equation" solves the body's
-        integral equation for every one, in seconds to minutes each (`creeping.surface_currents` with ``solve=True``).
-        "t-matrix" makes one matrix for each boundary and wavenumber (`creeping.t_matrix`), which has all incidences.
+        Method for the fields, by default "rays". "auto" repeats an incidence with the currents of the whole body if
+        isolated rays leave a direction unresolved, which takes about 0.1 s per boundary and wavenumber. "currents"
+        uses currents for every incidence that a mesh of the body resolves. ``by_currents`` marks these incidences.
+        "equation" solves the integral equation for every incidence, in seconds to minutes each
+        (`creeping.surface_currents` with ``solve=True``). "t-matrix" computes one matrix per boundary and wavenumber
+        (`creeping.t_matrix`) and all incidences from it.
     accuracy : float, optional
-        Interpolate fields between incidences, where they are dense and that is known to err by less than this share of
-        the field's size, ten times it of the creeping part's own; 1e-3 is a good one. Each incidence that cannot be had
-        so is computed: ``interpolated`` says which were, ``interpolation_error`` how well.
+        Interpolate fields between closely spaced incidences where the interpolation error is known to be below this
+        share of the field, and below ten times this share of the creeping part; 1e-3 is a good value. All other
+        incidences are computed. ``interpolated`` marks interpolated incidences; ``interpolation_error`` is the error.
     store : path, optional
-        Folder for the results (zarr), written task by task; the dataset is read from it when it is used. Without it
-        results are in memory.
+        Folder for the results (zarr), written task by task; the dataset reads from the folder on access. By default
+        results stay in memory.
     resume : bool
-        Go on with a store that exists: tasks that are missing, or have incidences that failed, are computed.
+        Continue an existing store: compute tasks that are missing or contain failed incidences.
     client : distributed.Client or str, optional
-        Dask cluster, or the address of its scheduler, that shares the tasks; it needs a store that all workers see.
+        Dask cluster that computes the tasks, or the address of its scheduler. All workers must see the store.
     chunk : int, optional
-        Incidences of one task; a store that exists keeps its own.
+        Number of incidences per task; an existing store keeps its number.
     progress : callable or bool, optional
-        True shows a bar, on a terminal and in a notebook. Or called as ``progress(done, total, seconds)`` with
-        incidences after each task, and where fields take long between its frequencies too, about once a second:
-        ``done`` has a fraction then.
+        True shows a bar, in a terminal or a notebook. A callable is called as ``progress(done, total, seconds)``, with
+        numbers of incidences, after each task. If fields take long it is also called between frequencies, about once a
+        second; ``done`` then has a fractional part.
 
     Returns
     -------
     xarray.Dataset
-        With ``incidence_status`` of each incidence: one that is singular or fails is marked there, and is no error.
+        ``incidence_status`` marks incidences that are singular or failed; these raise no error.
 
     Raises
     ------
     CreepingError
-        On bad input, all mistakes of the request at once; if the first incidences all fail with one and the same
-        error; if the store belongs to another study, is in use, or cannot be written. What was written is kept.
+        On bad input, listing all mistakes at once; if the first incidences all fail with the same error; if the store
+        belongs to another study, is in use, or cannot be written. Results already written remain.
 
     Examples
     --------

@@ -75,38 +75,38 @@ class SplineBody(LevelBody):
 
     @property
     def creases(self) -> tuple[Crease, ...]:
-        """Where smooth pieces meet."""
+        """Creases: edges, joints and tips at which smooth pieces meet or end."""
         return () if self._parts is None else self._parts.creases
 
     @property
     def pieces(self) -> tuple[SplinePiece, ...]:
-        """The smooth pieces, none of a body that is smooth as a whole."""
+        """The smooth pieces; empty if the whole body is smooth."""
         return () if self._parts is None else self._parts.surfaces
 
     @property
     def corners(self) -> FloatArray | None:
-        """Triangles (m, 3, 3), L, that pieces were fitted to; None of a body that is smooth as a whole."""
+        """Corners (m, 3, 3), L, of the triangles that the pieces were fitted to; None if the whole body is smooth."""
         return None if self._parts is None else self._parts.corners
 
     def piece(self, points: FloatArray) -> NDArray[np.int64]:
-        """Number of the piece that bounds the body nearest to points (..., 3), L, near it: (...)."""
+        """Number of the piece nearest to points (..., 3), L, which lie near the body: (...)."""
         if self._parts is None:
             return np.zeros(np.shape(points)[:-1], dtype=np.int64)
         return self._parts.space.numbers(points)
 
     def tiles(self, edge: float) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
-        """Triangles of the pieces with sides of at most ``edge``, L: corners, normals (m, 3, 3) and pieces (m,)."""
+        """Triangulate the pieces, with sides of at most ``edge``, L: corners, normals (m, 3, 3), piece numbers (m,)."""
         if self._parts is None:
             raise ValueError("a body that is smooth as a whole has no pieces; its charts cover it")
         return self._parts.tiles(edge)
 
     def non_smooth(self, points: FloatArray) -> NDArray[np.bool_]:
-        """Whether points (..., 3), L, lie where the body is not smooth enough, or not known well enough: (...)."""
+        """Whether the body near points (..., 3), L, is too rough, or too uncertain, for creeping rays: (...)."""
         return super().non_smooth(points) if self._parts is None else self._parts.non_smooth(points)
 
     @property
     def quick_charts(self) -> bool:
-        """Whether charts take no time; else only maps ask for them."""
+        """Whether charts are available without computation; otherwise only phase maps compute them."""
         return self._map is not None
 
     def _covered(self) -> "CubeSphereAtlas | MongeAtlas":
@@ -221,7 +221,7 @@ class FittedBody(SplineBody):
 
     @property
     def coarse_factor(self) -> float:
-        """The body's error over its difference from ``coarse_fit``."""
+        """Ratio of the error of the body to its difference from ``coarse_fit``."""
         return self.fit.factor
 
     def _describe(self, arrays: dict[str, FloatArray], text: dict[str, Any]) -> None:

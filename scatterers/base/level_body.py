@@ -88,12 +88,12 @@ class Body(Shown):
 
     @property
     def creases(self) -> Sequence["Crease"]:
-        """None: the body is smooth as a whole."""
+        """Empty: the whole body is smooth."""
         return ()
 
     @property
     def tiling(self) -> Sequence[Any]:
-        """Charts whose unit squares cover the body once and meet along their sides; none if it has no such charts."""
+        """Charts whose unit squares cover the body once and meet along their sides; empty if there are none."""
         return ()
 
     def _set_speed(self) -> None:
@@ -105,7 +105,7 @@ class Body(Shown):
 
     @property
     def fingerprint(self) -> str | None:
-        """Text that changes with the shape or the speed; None if the speed cannot be named."""
+        """Text that identifies shape and speed; None if the speed has no fingerprint."""
         values = self._shape_texts()
         speed: Any = getattr(self, "speed", None)
         if speed is not None:
@@ -117,7 +117,7 @@ class Body(Shown):
 
 
 class LevelBody(Body):
-    """Base; a subclass calls `_place` when F is known, and gives its ``_identity``."""
+    """Base of bodies given by a level function F; a subclass calls `_place` with F and defines ``_identity``."""
 
     _space: SpaceLevel
     _map: RadialMap | None
@@ -216,7 +216,7 @@ class LevelBody(Body):
 
     @property
     def tiling(self) -> Sequence[FaceChart]:
-        """The six charts of a star-shaped body; none of others."""
+        """The six charts of a star-shaped body; empty for other bodies."""
         return CubeSphereAtlas(self._map).charts if self._map is not None else ()
 
     def _covered(self) -> "CubeSphereAtlas | MongeAtlas":

@@ -108,7 +108,7 @@ class BentEllipsoid(Body):
 
     @property
     def axis_of_revolution(self) -> tuple[float, float, float] | None:
-        """Unit vector along the axis of a spheroid, z of a sphere; None of any other body."""
+        """Unit vector along the axis of a spheroid, z of a sphere; None for any other ellipsoid."""
         a, b, c, d = self._shape()
         if d != 0.0 or not (a == b or b == c or c == a):
             return None

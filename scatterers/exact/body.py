@@ -142,12 +142,12 @@ class PiecewiseBody(Levelled, Body):
 
     @property
     def pieces(self) -> Sequence[Piece]:
-        """Smooth surfaces that bound the body, one after the other."""
+        """Smooth surfaces that bound the body, in order."""
         raise NotImplementedError
 
     @property
     def creases(self) -> Sequence[Crease]:
-        """Where pieces meet or end."""
+        """Creases: edges, joints and tips at which pieces meet or end."""
         raise NotImplementedError
 
     @property
@@ -156,7 +156,7 @@ class PiecewiseBody(Levelled, Body):
         raise NotImplementedError
 
     def piece(self, points: FloatArray) -> IntArray:
-        """Number of the piece whose part of the body is nearest: points (..., 3), L, near the body, to (...)."""
+        """Number of the piece nearest to points (..., 3), L, which lie near the body: (...)."""
         return evaluated(self._compiled_numbers, points)[0].astype(np.int64)
 
     def tiles(self, edge: float) -> tuple[FloatArray, FloatArray, IntArray]:
@@ -165,9 +165,9 @@ class PiecewiseBody(Levelled, Body):
         Returns
         -------
         corners, normals : (m, 3, 3), L and 1
-            Counter-clockwise seen from outside; on the piece of the triangle, its normals there.
+            Corners are counter-clockwise seen from outside and lie on one piece; normals are those of that piece.
         pieces : (m,)
-            No triangle lies on two.
+            Number of the piece of each triangle.
         """
         raise NotImplementedError
 

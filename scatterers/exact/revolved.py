@@ -165,7 +165,7 @@ class Revolved(PiecewiseBody):
 
     @property
     def axis_of_revolution(self) -> tuple[float, float, float] | None:
-        """Unit vector along the axis, None of an affine image that has none."""
+        """Unit vector along the axis; None if the body is stretched and not a body of revolution."""
         if self._stretch != 1.0:
             return None
         x, y, z = (float(self._axes[2] == k) for k in range(3))

@@ -72,33 +72,33 @@ def conductor_field(
     polarisation: str | ArrayLike | None = None,
     method: str = "auto",
 ) -> ConductorField:
-    """Total E and H at points off a perfect conductor or on it, with their error.
+    """Total E and H, and their error, at points outside a perfect conductor or on it.
 
     Parameters
     ----------
     fan : RayFan
-        Long enough to pass where rays leave towards the points.
+        Its rays must be long enough to pass the places where waves leave the body towards the points.
     points : (..., 3), L
         Outside the body or on it.
     wavenumber : float, 1/L
     polarisation : "theta", "phi" or (3,) complex, optional
-        E0 of the incident wave, across its direction and of any length; both theta and phi if it is not given.
+        E0 of the incident wave, transverse and of any length; by default both theta and phi.
     method : {"auto", "equation"}
-        Whether rays and the expansions' currents serve where they can, or the solution of the body's integral equation
-        everywhere (`surface_currents` with ``solve=True``). A body with joints has no others.
+        "auto" uses rays and currents by expansions where they apply. "equation" uses the solution of the integral
+        equation everywhere (`surface_currents` with ``solve=True``), as "auto" does for a piecewise smooth body.
 
     Returns
     -------
     ConductorField
-        E in units of the incident E, and H times the impedance of free space in the same.
+        E, and H times the impedance of free space, in units of the incident E.
 
     Raises
     ------
     InvalidInputError
-        On points inside the body or not finite, a bad wavenumber, polarisation or method, for a weighted body, and for
-        one with edges or joints, or if the equation is asked for, where it cannot be solved.
+        On points inside the body or not finite, a bad wavenumber, polarisation or method, for a weighted body, or if
+        the equation is needed (method="equation", or a body with edges or joints) and cannot be solved.
     SurfaceError
-        If the equation must be solved and the wavenumber is too high for any mesh of the body.
+        If the equation has to be solved and the wavenumber is too high for any mesh of the body.
 
     Examples
     --------
@@ -153,7 +153,7 @@ def conductor_current(
     polarisation: str | ArrayLike | None = None,
     method: str = "auto",
 ) -> ConductorCurrent:
-    """Current J = n x H and charge n.E at points of a perfect conductor, with their error; it acts as the array of J.
+    """Current J = n x H and charge n.E at points of a perfect conductor, and their errors.
 
     Parameters
     ----------
@@ -162,22 +162,22 @@ def conductor_current(
         Points on the body, lit or in the shadow.
     wavenumber : float, 1/L
     polarisation : "theta", "phi" or (3,) complex, optional
-        E0 of the incident wave, across its direction and of any length; both theta and phi if it is not given.
+        E0 of the incident wave, transverse and of any length; by default both theta and phi.
     method : {"auto", "equation"}
-        As of `conductor_field`.
+        As for `conductor_field`.
 
     Returns
     -------
     ConductorCurrent
-        J in units of the incident H, the charge in those of the incident E.
+        J in units of the incident H, the charge in units of the incident E; usable as the array of J.
 
     Raises
     ------
     InvalidInputError
-        On points off the body or not finite, a bad wavenumber, polarisation or method, for a weighted body, and for one
-        with edges or joints, or if the equation is asked for, where it cannot be solved.
+        On points off the body or not finite, a bad wavenumber, polarisation or method, for a weighted body, or if the
+        equation is needed (method="equation", or a body with edges or joints) and cannot be solved.
     SurfaceError
-        If the equation must be solved and the wavenumber is too high for any mesh of the body.
+        If the equation has to be solved and the wavenumber is too high for any mesh of the body.
 
     Examples
     --------

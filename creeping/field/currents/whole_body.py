@@ -80,35 +80,37 @@ OFF = 0.25
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SurfaceCurrents:
-    """Currents at nodes of the body, whose weighted sums are integrals over it.
+    """Surface currents of the whole body at quadrature nodes.
 
     Attributes
     ----------
     body : Surface
     direction : (3,)
-        Of incidence.
+        Direction of incidence d.
     points, normals : (n, 3), L and 1
+        Nodes and outward normals.
     weights : (n,), L^2
-        Where two expansions share a region, each node has its share of the area.
+        Quadrature weights. In the penumbra, where both expansions have nodes, the weights include the blending factor.
     travel : (n, 3)
-        Where the phase runs: d on the lit side, the ray's tangent on rays.
+        Direction in which the phase advances: d on the lit side, the tangent of the ray on creeping rays.
     values : (n,) complex
-        Field u, or du/dn (1/L) of the soft boundary; of a conductor (n, 3, 2), n x H for an incident wave of unit E
-        along theta and phi.
+        Field u, or du/dn (1/L) on a soft boundary. On a conductor (n, 3, 2): n x H for incident waves of unit E along
+        theta and phi.
     change : as values
-        What of it is of second order.
+        Second-order part of the values; residual of the equation for solved currents.
     lit : (n,) of bool
-        Whether the lit side's expansion served, else creeping rays; of solved currents, whether ground is lit.
+        Whether the lit side's expansion gave the value, rather than creeping rays. For solved currents: whether the
+        node is lit.
     rim : (l, 3), L
-        Points of the shadow line, evenly spread.
+        Equally spaced points of the shadow line.
     rim_length : float, L
+        Length of the shadow line.
     unserved : float
-        Share of the shadow line from which no creeping ray starts: the currents behind it are missing.
+        Share of the shadow line that launches no creeping ray; the currents behind that part are missing.
     wavenumber : float, 1/L
     boundary : Boundary
     solved : bool
-        Whether nodes are all over the body and their values satisfy its integral equation
-        (`creeping.field.equation`); ``change`` is what is left of the equation then.
+        Whether the values solve the integral equation on the whole body (`creeping.field.equation`).
 
     Examples
     --------
@@ -151,7 +153,7 @@ class SurfaceCurrents:
         )
 
     def part(self, which: BoolArray) -> SurfaceCurrents:
-        """Currents of some of the nodes (n,) alone."""
+        """Currents at the nodes selected by a mask (n,)."""
         names = ["points", "normals", "weights", "travel", "values", "change", "lit"]
         found: SurfaceCurrents = replace(self, **{name: getattr(self, name)[which] for name in names})
         return found
@@ -161,7 +163,7 @@ class SurfaceCurrents:
         return self.far_of(np.ones(len(self.lit), dtype=bool), directions)
 
     def far_of(self, part: BoolArray, directions: ArrayLike) -> ComplexArray:
-        """What some of the nodes (n,) give to `far`, L: (m, 3) -> (m,)."""
+        """Contribution to `far` of the nodes selected by a mask (n,), L: (m, 3) -> (m,)."""
         return self._radiated(self.values, part, observers_of(directions))
 
     def scattered(self, points: ArrayLike) -> ComplexArray:
@@ -170,7 +172,7 @@ class SurfaceCurrents:
         Raises
         ------
         InvalidInputError
-            If a point is nearer to a node than an eighth of a wavelength, where sums over nodes are no integrals.
+            If a point is nearer to a node than an eighth of a wavelength, where the quadrature fails.
         """
         return self._field(self.values, self._off_the_body(points))
 
@@ -188,7 +190,7 @@ class SurfaceCurrents:
         return x
 
     def reflected_onto(self, points: FloatArray, normals: FloatArray) -> ComplexArray:
-        """What points of a soft or hard body (m, 3), L, with normals, receive from above: u, or du/dn if soft (m,)."""
+        """u, or du/dn if soft (m,), that points (m, 3), L, of the body, with normals, receive from nodes above them."""
         u, slope = self._scalar(self.values)
         nothing = np.zeros(len(self.points), dtype=complex)
         single, double = (nothing if one is None else one / (4 * np.pi) for one in (slope, u))
@@ -196,12 +198,14 @@ class SurfaceCurrents:
         return received((points, normals), nodes, -single, double, self.wavenumber, soft=self.boundary.kind == "soft")
 
     def left_inside(self, points: ArrayLike) -> ComplexArray:
-        """What is left of the incident wave at points (m, 3), L, inside the body, as a share of it: (m,).
+        """Residual field at points (m, 3), L, inside the body, relative to the incident wave: (m,).
+
+        Exact currents would leave 0.
 
         Raises
         ------
         InvalidInputError
-            If a point is outside, or too near to the body (`scattered`).
+            If a point is outside the body, or too close to its surface (see `scattered`).
         """
         x = as_points(points).reshape(-1, 3)
         out = np.flatnonzero(~inside(self.body, x))
@@ -211,29 +215,27 @@ class SurfaceCurrents:
 
     @cached_property
     def inner_points(self) -> FloatArray:
-        """Points inside the body at which the currents are judged (m, 3), L; none where it is nowhere thick enough."""
+        """Interior points at which the residual field is measured (m, 3), L; none if the body is too thin."""
         wavelength = 2 * np.pi / self.wavenumber
         found = (inner_points(self.body, depth * wavelength, POINTS) for depth in (DEPTH, SHALLOW))
         return next((points for points in found if len(points)), np.zeros((0, 3)))
 
     @cached_property
     def extinction(self) -> float:
-        """Rms of what is left of the incident wave inside, as a share of it; NaN if the body is nowhere thick enough.
+        """Extinction error: rms residual field inside, relative to the incident wave; NaN if the body is too thin.
 
-        Of solved currents at least 2e-5.
-
-        It is the error of the far field, rms over all directions, as a share of the field's rms, within a factor of
-        about 2. Of a conductor it is the mean of both polarisations, in the square.
+        It estimates the relative rms error of the far field over all directions, within a factor of about 2. For
+        solved currents it is at least 2e-5. For a conductor it is the rms over both polarisations.
         """
         return float(np.sqrt(np.mean(self._left**2)))
 
     @cached_property
     def mean_amplitude(self) -> float:
-        """Rms of |f| over all directions, L, of a body that absorbs nothing; a bound of it if it absorbs."""
+        """Rms of |f| over all directions, L; an upper bound for a body that absorbs."""
         return float(np.sqrt(np.mean(self._amplitude**2)))
 
     def error(self, directions: ArrayLike) -> FloatArray:
-        """Error of f, L, that 95 of 100 directions keep to: (m, 3) -> (m,), of a conductor (m, 2, 2)."""
+        """Error of f, L, that covers 95 % of directions: (m, 3) -> (m,), for a conductor (m, 2, 2)."""
         r = observers_of(directions)
         level, shape = self._factors
         lit, dark = (self._radiated(self.change, part, r) for part in (self.lit, ~self.lit))
@@ -246,11 +248,11 @@ class SurfaceCurrents:
         return np.asarray(np.hypot(error, 0.0 if self.solved else QUADRATURE * self._amplitude))
 
     def changed(self, points: ArrayLike) -> FloatArray:
-        """What the second order adds at points (m, 3), L, off the body, over what it adds inside, rms: (m,)."""
+        """Second-order part of the field at points (m, 3), L, off the body, over its rms inside the body: (m,)."""
         return self._with_change(as_points(points).reshape(-1, 3))[1]
 
     def scattered_and_changed(self, points: ArrayLike) -> tuple[ComplexArray, FloatArray]:
-        """`scattered` and `changed` at points (m, 3), L, by one sum over the nodes: (m, ...) each."""
+        """`scattered` and `changed` at points (m, 3), L, computed in one sum over the nodes: (m, ...) each."""
         return self._with_change(self._off_the_body(points))
 
     def _with_change(self, x: FloatArray) -> tuple[ComplexArray, FloatArray]:

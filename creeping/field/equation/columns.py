@@ -32,8 +32,8 @@ DENSE = 8e9
 """Bytes of a matrix, and of its transpose, that are kept at most."""
 
 TOLERANCE, COARSE_TOLERANCE, STEPS = 3e-5, 3e-3, 80
-"""What is left of the equation, as a share of its right side, and steps at most. Coarse tiles err by 0.03 % of the
-largest amplitude; 3e-3 gives 0.03 to 0.05 %, 1e-2 gives 0.1 % (cylinders, k = 20 and 40)."""
+"""Residual of the equation relative to its right side, and most steps. Coarse tiles err by 0.03 % of the largest
+amplitude; 3e-3 gives 0.03 to 0.05 %, 1e-2 gives 0.1 % (cylinders, k = 20 and 40)."""
 
 ROWS = 4096
 """Rows of the sparse matrix that are made at a time."""

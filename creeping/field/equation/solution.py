@@ -41,22 +41,23 @@ TOUCHING = 1e-6
 
 
 class Solution:
-    """What `solve` found: currents of the whole body for m incidences, and the fields that they give.
+    """Solution of the integral equation for m incidences: currents on the whole body, and the fields they radiate.
 
     Attributes
     ----------
     body : Surface
     directions : (m, 3)
-        Of incidence.
+        Directions of incidence.
     wavenumber : float, 1/L
     boundary : "soft", "hard", "pec" or ImpedanceBoundary
     nodes : int
+        Number of quadrature nodes.
     steps : int
-        Of GMRES.
+        Number of GMRES iterations.
     effort : Effort
-        Whether its tiles are coarse, and the steps of GMRES at most.
+        Whether coarse tiles were used, and the limit of GMRES iterations.
     left : (m,) or (m, 2)
-        What is left of the equation, as a share of its right side.
+        Residual of the equation relative to its right-hand side.
 
     Examples
     --------
@@ -159,24 +160,24 @@ class Solution:
         return {}
 
     def far_field(self, observation: ArrayLike, incidence: int = 0) -> FarField:
-        """Far field of one incidence in directions (..., 3), which need not be unit, with its error."""
+        """Far field of one incidence, given by its number, in directions (..., 3), which need not be unit."""
         return self._far(observers_of(observation), self.currents(incidence))
 
     def _far(self, r: FloatArray, currents: SurfaceCurrents) -> FarField:
         return far_by_currents(currents, r, self.boundary)
 
     def backscatter(self) -> FarField:
-        """Far field of each incidence back to where it comes from, in directions -d (m,)."""
+        """Backscatter: the far field of each incidence d in direction -d, (m,)."""
         each = [self._far(-d[None], self.currents(number)) for number, d in enumerate(self.directions)]
         return FarField.joined(each)
 
     def near_field(self, points: ArrayLike, incidence: int = 0) -> NearField:
-        """Field u at points (..., 3), L, outside the body at any distance from it, of one incidence.
+        """Total field u of one incidence at points (..., 3), L, outside the body or on it, at any distance.
 
         Raises
         ------
         InvalidInputError
-            If points are inside the body, and of a conductor.
+            If points are inside the body, or the boundary is "pec".
         """
         self._scalar("near_field")
         y = as_points(points)
@@ -197,14 +198,14 @@ class Solution:
     def conductor_field(
         self, points: ArrayLike, incidence: int = 0, polarisation: str | ArrayLike | None = None
     ) -> ConductorField:
-        """Total E and H at points (..., 3), L, on a conductor or off it at any distance, of one incidence.
+        """Total E and H of one incidence at points (..., 3), L, outside a conductor or on it, at any distance.
 
-        ``polarisation`` is E0 as of `creeping.conductor_field`; both theta and phi if it is not given.
+        ``polarisation`` is E0, as for `creeping.conductor_field`; by default both theta and phi.
 
         Raises
         ------
         InvalidInputError
-            If points are inside the body, on a bad polarisation, and of what is no conductor.
+            If points are inside the body, the polarisation is not usable, or the boundary is not "pec".
         """
         y, single = as_points(points), polarisation is not None
         x, currents = y.reshape(-1, 3), self._polarised("conductor_field", incidence, polarisation)
@@ -233,14 +234,14 @@ class Solution:
     def conductor_current(
         self, points: ArrayLike, incidence: int = 0, polarisation: str | ArrayLike | None = None
     ) -> ConductorCurrent:
-        """J and n.E at the places of a conductor nearest to points (..., 3), L, of one incidence.
+        """J and n.E of one incidence on a conductor, at the surface points nearest to points (..., 3), L.
 
-        ``polarisation`` as of `conductor_field`.
+        ``polarisation`` is that of `conductor_field`.
 
         Raises
         ------
         InvalidInputError
-            On a bad polarisation, and of what is no conductor.
+            If the polarisation is not usable, or the boundary is not "pec".
         """
         y, single = as_points(points), polarisation is not None
         currents = self._polarised("conductor_current", incidence, polarisation)
@@ -263,12 +264,12 @@ class Solution:
         )
 
     def surface_field(self, points: ArrayLike, incidence: int = 0) -> SurfaceField:
-        """Field u, or du/dn of a soft body, at the places of the body nearest to points (..., 3), L, of one incidence.
+        """u, or du/dn on a soft body, of one incidence at the surface points nearest to points (..., 3), L.
 
         Raises
         ------
         InvalidInputError
-            Of a conductor.
+            If the boundary is "pec".
         """
         self._scalar("surface_field")
         y = as_points(points)

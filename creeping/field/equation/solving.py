@@ -53,21 +53,21 @@ def solve(
     seconds: float = SECONDS,
     progress: Callable[[str], None] | bool | None = None,
 ) -> Solution:
-    """The field that a body scatters, by its integral equation: no shadow line and no rays are needed.
+    """Solve the integral equation of scattering by a body; no shadow line and no rays are needed.
 
     Parameters
     ----------
     body : Surface
         Smooth, or of pieces with edges, joints and tips.
     directions : (3,) or (m, 3)
-        Of incidence; need not be unit. All are solved together.
+        Directions of incidence; need not be unit. All are solved together.
     wavenumber : float, 1/L
     boundary : "soft", "hard", "pec" or ImpedanceBoundary
     seconds : float
-        What it may take, about, with all cores. Where fine tiles take more, coarse ones serve and as many steps of
-        GMRES as there is time for, with a larger error; what takes more still is refused before it starts.
+        Approximate limit of the run time on all cores. If fine tiles would exceed it, coarse tiles and fewer GMRES
+        iterations are used, with a larger error. If these exceed it too, an error is raised before the start.
     progress : callable or bool, optional
-        Is told in words what is done, with the number of nodes, the time and the memory that it takes; True shows it.
+        Called with a line of text before each step, with the number of nodes, the time and the memory; True shows them.
 
     Returns
     -------
@@ -76,9 +76,9 @@ def solve(
     Raises
     ------
     InvalidInputError
-        On bad arguments, for a weighted body, and if it would take more time or memory than it may.
+        On bad arguments, for a weighted body, or if the solution would exceed the limits of time or memory.
     SurfaceError
-        If the body has no mesh.
+        If the body cannot be meshed.
 
     Examples
     --------
@@ -99,7 +99,7 @@ def solve(
     if plan.refused:
         raise InvalidInputError(
             f"the integral equation at wavenumber {k:g} for {len(d)} incidences is not solved: {plan.refused}; "
-            "give seconds=, fewer incidences, a lower wavenumber, more memory (CREEPING_MEMORY), or let rays serve "
+            "give seconds=, fewer incidences, a lower wavenumber, more memory (CREEPING_MEMORY), or use rays "
             "(creeping.far_field)"
         )
     with telling(progress) as tell:
@@ -161,8 +161,8 @@ def asked_solution(body: Surface, direction: FloatArray, wavenumber: float, boun
             return found
         if plan.refused:
             raise InvalidInputError(
-                f"the integral equation is not solved at wavenumber {wavenumber:g}: {plan.refused}; rays and optics "
-                "serve without method='equation'"
+                f"the integral equation is not solved at wavenumber {wavenumber:g}: {plan.refused}; without "
+                "method='equation' rays and optics are used"
             )
         found = Solved(_solved(body, direction[None], wavenumber, boundary, plan.effort), 0)
         _keep(body, found.solution)

@@ -56,44 +56,45 @@ def antenna_coupling(
     order: int = 2,
     length: float | Literal["auto"] = AUTO,
 ) -> Coupling:
-    """Fields between slots in and monopoles on a perfect conductor: at each of them of a unit moment at each other.
+    """Matrix of fields between slots in, and monopoles on, a perfect conductor, for unit moments.
 
-    Ports are the slots and then the monopoles. Row i is the source, a magnetic moment V dl along a slot as of
-    `slot_coupling` or an electric one I h along n as of `monopole_coupling`; column j what it gives: H along a slot or
-    E along n at a monopole. With electric moments and H times the impedance of free space all values are of one kind,
-    1/L^2: those of slots alone and of monopoles alone are those of the functions named, and what a monopole gives a
-    slot is H of a unit I h, what a slot gives a monopole E of a unit V dl. On a plane the latter is
-    -2 ik (1 + i/kr) e^{ikr}/(4 pi r) for a slot along n x (direction of the path), across it, and 0 for one along it.
+    Ports are numbered slots first, then monopoles. Row i is the source: a magnetic moment V dl along a slot
+    (`slot_coupling`), or an electric moment I h along n (`monopole_coupling`). Column j is the received field: H along
+    a slot, or E along n at a monopole. Electric moments and H are multiplied by the impedance of free space, so that
+    all values are in 1/L^2. Entries between slots, and between monopoles, equal those of `slot_coupling` and
+    `monopole_coupling`. From a monopole to a slot the entry is H for a unit I h, from a slot to a monopole E for a unit
+    V dl. On a plane E is -2 ik (1 + i/kr) e^{ikr}/(4 pi r) for a slot along n x (direction of the path), i.e. across
+    the path, and 0 for a slot along the path.
 
-    The matrix is not symmetric: by reciprocity H at slot i of monopole j is minus E at monopole j of slot i, as hybrid
-    parameters have it. Currents of slots and voltages of monopoles that receive come from voltages of slots and
-    currents of monopoles by ``values.T @ moments``, the diagonal, which is not known, left out.
+    The matrix is not symmetric: by reciprocity H at slot i due to monopole j is minus E at monopole j due to slot i, as
+    for hybrid parameters. ``values.T @ moments``, with the unknown diagonal left out, gives currents of receiving slots
+    and voltages of receiving monopoles from voltages of slots and currents of monopoles.
 
     Parameters
     ----------
     body : Surface
-        Smooth and plain.
+        Smooth and without a speed.
     slots : (n, 3), L
         On the body, one or more.
     axes : (n, 3) or (3,)
-        Directions of the slots, of any length; their tangential parts count.
+        Directions of the slots, of any length; only the tangential components are used.
     monopoles : (m, 3), L
-        On the body, one or more; no two ports in one place.
+        On the body, one or more; no two ports at the same point.
     wavenumber : float, 1/L
     order : 2 or 1
     length : float or "auto", L
-        As of `coupling`.
+        As for `coupling`.
 
     Returns
     -------
     Coupling
-        A matrix (n + m, n + m), 1/L^2, with errors, statuses and geodesics as of `coupling`; its ``kinds`` say "slot"
-        and "monopole".
+        Matrix (n + m, n + m), 1/L^2, with errors, statuses and geodesics as for `coupling`; ``kinds`` has "slot" and
+        "monopole".
 
     Raises
     ------
     InvalidInputError
-        On no slots or no monopoles, ports off the body, or two in one place, axes that are not tangential at all, a bad
+        On no slots or no monopoles, ports off the body, or two in one place, axes without a tangential component, a bad
         wavenumber, order or length, and for a weighted body or one with edges.
     SurfaceError
         If geodesics cannot be traced on the body.
@@ -153,28 +154,28 @@ def monopole_coupling(
     order: int = 2,
     length: float | Literal["auto"] = AUTO,
 ) -> Coupling:
-    """Fields between monopoles on a perfect conductor: E along n at each of a unit electric moment at each other.
+    """Matrix of fields between monopoles on a perfect conductor: E along n at one, of a unit moment at another.
 
-    A short monopole with the current I all along its height h is the moment I h along the normal. Values are E there
-    along the normal, with the conductor in place, times the admittance of free space, for a unit of the moment: on a
-    plane twice ik (1 + grad grad/k^2) e^{ikr}/(4 pi r), near field and all. The mutual impedance of two short monopoles
-    is minus that times their heights and the impedance of free space.
+    A short monopole of height h with uniform current I is an electric moment I h along the normal. Values are E along
+    the normal in the presence of the conductor, times the admittance of free space, per unit moment. On a plane this
+    is twice ik (1 + grad grad/k^2) e^{ikr}/(4 pi r), including the near field. The mutual impedance of two short
+    monopoles is minus the value times both heights and the impedance of free space.
 
     Parameters
     ----------
     body : Surface
-        Smooth and plain.
+        Smooth and without a speed.
     ports : (n, 3), L
-        On the body, two or more, no two in one place.
+        On the body, two or more, no two at the same point.
     wavenumber : float, 1/L
     order : 2 or 1
     length : float or "auto", L
-        As of `coupling`.
+        As for `coupling`.
 
     Returns
     -------
     Coupling
-        A symmetric matrix (n, n), 1/L^2, with errors, statuses and geodesics as of `coupling`.
+        Symmetric matrix (n, n), 1/L^2, with errors, statuses and geodesics as for `coupling`.
 
     Raises
     ------
@@ -225,37 +226,37 @@ def slot_coupling(
     order: int = 2,
     length: float | Literal["auto"] = AUTO,
 ) -> Coupling:
-    """Fields between slots in a perfect conductor: H along each of a unit magnetic dipole along each other.
+    """Matrix of fields between slots in a perfect conductor: H along one, of a unit magnetic dipole along another.
 
-    A slot of voltage V (its field integrated across it) and length dl is the moment V dl along it. Values are the
-    tangential H there, along the receiving slot and with the conductor in place, times the impedance of free space, for
-    a unit of the moment: on a plane twice ik (1 + grad grad/k^2) e^{ikr}/(4 pi r), near field and all. The mutual
-    admittance of two short slots is that times their lengths over the impedance of free space, but for its sign, which
-    is a matter of the directions of their currents.
+    A slot of length dl and voltage V (its field integrated across the slot) is a magnetic moment V dl along the slot.
+    Values are H along the receiving slot in the presence of the conductor, times the impedance of free space, per unit
+    moment. On a plane this is twice ik (1 + grad grad/k^2) e^{ikr}/(4 pi r), including the near field. The mutual
+    admittance of two short slots is the value times both lengths over the impedance of free space; its sign depends on
+    the reference directions of the currents.
 
     Parameters
     ----------
     body : Surface
-        Smooth and plain.
+        Smooth and without a speed.
     ports : (n, 3), L
-        On the body, two or more, no two in one place.
+        On the body, two or more, no two at the same point.
     axes : (n, 3) or (3,)
-        Directions of the slots, of any length; their tangential parts count.
+        Directions of the slots, of any length; only the tangential components are used.
     wavenumber : float, 1/L
     order : 2 or 1
     length : float or "auto", L
-        As of `coupling`.
+        As for `coupling`.
 
     Returns
     -------
     Coupling
-        A symmetric matrix (n, n), 1/L^2, with errors, statuses and geodesics as of `coupling`. Where slots are crossed
-        so that next to nothing is received, the error tells so and the status is OK as it is for other axes.
+        Symmetric matrix (n, n), 1/L^2, with errors, statuses and geodesics as for `coupling`. Slots may be oriented so
+        that almost nothing is received. The status is OK there too, as for other axes; only the error shows it.
 
     Raises
     ------
     InvalidInputError
-        On ports off the body, or two in one place, axes that are not tangential at all, a bad wavenumber, order or
+        On ports off the body, or two in one place, axes without a tangential component, a bad wavenumber, order or
         length, and for a weighted body or one with edges.
     SurfaceError
         If geodesics cannot be traced on the body.

@@ -58,7 +58,7 @@ NEAR = 2.0
 
 @dataclass(frozen=True, eq=False)
 class CouplingPaths:
-    """Geodesics (m,) from one port to another, the shortest first.
+    """The m geodesics from one port to another, shortest first.
 
     Attributes
     ----------
@@ -66,14 +66,14 @@ class CouplingPaths:
     departure, arrival : (m, 3)
         Unit tangents at both ends, along the path.
     spreading : (m,), L
-        Reduced length J2: by how much geodesics part for an angle at the source; negative beyond an odd number of
-        caustics.
+        Reduced length J2: separation of neighbouring geodesics per unit angle at the source. It is negative after an
+        odd number of caustics.
     fock_parameter : (m,)
         xi = (k/2)^(1/3) int kappa_n^(2/3) ds.
     caustics : (m,)
-        Zeros of J2 passed.
+        Number of zeros of J2 along the path.
     wave : (m,) complex, 1/L, or 1/L^2 on a conductor
-        What each contributes; infinite on its caustic.
+        Contribution of each geodesic; infinite if the receiver is on its caustic.
 
     Examples
     --------
@@ -99,35 +99,37 @@ class CouplingPaths:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Coupling(ArrayResult, Drawn):
-    """Fields between ports on a body, at port j of a unit source at port i; acts as their matrix.
+    """Matrix of fields between ports on a body; entry (i, j) is the field at port j of a unit source at port i.
 
-    Of `coupling` u of e^{ikr}/(4 pi r); of `slot_coupling` H along slot j of a dipole along slot i; of
-    `monopole_coupling` E along the normal; of `antenna_coupling` what port j of both kinds receives so.
+    The field is u of e^{ikr}/(4 pi r) for `coupling`, H along slot j of a magnetic dipole along slot i for
+    `slot_coupling`, and E along the normal of an electric dipole along the normal for `monopole_coupling`. For
+    `antenna_coupling` it is H or E, as the receiver is a slot or a monopole. The result is usable as the array of its
+    values.
 
     Attributes
     ----------
     body : Surface
     ports, normals : (n, 3), L and 1
     values : (n, n) complex, 1/L, or 1/L^2 on a conductor
-        Infinite on the diagonal, where source and receiver are one. Symmetric, but for slots and monopoles, where one
-        way has the opposite of the other.
+        Infinite on the diagonal, where source and receiver coincide. Symmetric, except that entries between a slot and
+        a monopole change sign when source and receiver are exchanged.
     error : (n, n)
-        Of the values, meant to hold for 95 of 100 whose status is OK; at others a bound.
+        Error of the values. It covers 95 % of the entries whose status is OK; elsewhere it is a bound.
     status : (n, n) of int
         Codes of `FieldStatus`.
     method : (n, n) of str
-        "rays", or "beams" where these merge; "none" on the diagonal.
+        "rays", or "beams" near caustics; "none" on the diagonal.
     wavenumber : float, 1/L
     boundary : str
     order : int
     length : float, L
-        Up to which geodesics were followed.
+        Length up to which geodesics were traced.
     length_unit : str
-        "m" where the body knows it, else "L".
+        "m" if the body states it, else "L".
     kinds : (n,) of str
         "point", "slot" or "monopole".
     axes : (n, 3) or None
-        Unit tangents along the slots, and normals of monopoles beside them; None of `coupling` and `monopole_coupling`.
+        Unit tangents along slots and normals at monopoles; None for `coupling` and `monopole_coupling`.
 
     Examples
     --------
@@ -175,11 +177,11 @@ class Coupling(ArrayResult, Drawn):
 
     @property
     def status_counts(self) -> dict[str, int]:
-        """Number of entries of each status that occurs, by name."""
+        """Number of entries by name of status; only statuses that occur."""
         return {s.name: int(np.sum(self.status == s)) for s in FieldStatus if np.any(self.status == s)}
 
     def paths(self, source: int, receiver: int) -> CouplingPaths:
-        """Geodesics from one port to another, and what each contributes.
+        """Geodesics from one port to another, and the contribution of each.
 
         Parameters
         ----------
@@ -189,12 +191,12 @@ class Coupling(ArrayResult, Drawn):
         Returns
         -------
         CouplingPaths
-            Of lengths in L and unit directions; empty for a port and itself.
+            Lengths in L and unit directions; empty if source and receiver are the same port.
 
         Raises
         ------
         InvalidInputError
-            If there is no such port.
+            If a number is not that of a port.
         """
         count = len(self.ports)
         for number in (source, receiver):
@@ -225,7 +227,7 @@ class Coupling(ArrayResult, Drawn):
         return power(self.length_unit, -1 if kinds == ["point"] else -2), MEANINGS["".join(kinds)]
 
     def to_xarray(self) -> xarray.Dataset:
-        """Values, error, status and method with names, by source and receiver: an ``xarray.Dataset``."""
+        """``xarray.Dataset`` of values, error, status and method, by source and receiver."""
         library = required("xarray", use="labelled results need", extra="sweep")
         dims = ("source", "receiver")
         inverse = {"units": power(self.length_unit, -1)}
@@ -250,7 +252,7 @@ class Coupling(ArrayResult, Drawn):
         return found
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """The same as a ``pandas.DataFrame``, one row an entry."""
+        """Contents of `to_xarray` as a ``pandas.DataFrame``, one row per entry."""
         return (
             self.to_xarray()
             .drop_vars(["port", "slot", "moment"], errors="ignore")
@@ -284,28 +286,28 @@ def coupling(
     order: int = 2,
     length: float | Literal["auto"] = AUTO,
 ) -> Coupling:
-    """Fields between ports on a hard body: u at each of them of a unit point source e^{ikr}/(4 pi r) at each other.
+    """Matrix of fields u between ports on a hard body: a unit point source e^{ikr}/(4 pi r) at one, u at another.
 
     Parameters
     ----------
     body : Surface
-        Smooth and plain.
+        Smooth and without a speed.
     ports : (n, 3), L
         On the body, two or more.
     wavenumber : float, 1/L
     boundary : "hard"
-        On a soft body the field is 0; that of an impedance is not known here.
+        Only "hard" is supported. On a soft body the field is 0.
     order : 2 or 1
     length : float or "auto", L
-        Up to which geodesics are followed; "auto" is where the wave has died away, and at least long enough for both
-        ways round to meet.
+        Length up to which geodesics are traced. "auto" ends where the wave has decayed, but is long enough for
+        geodesics in opposite directions to meet.
 
     Returns
     -------
     Coupling
-        A matrix (n, n), 1/L, that acts as an array, with errors, statuses, and the geodesics of each pair. Trouble of a
-        pair is a status: CAUSTIC where geodesics merge and beams do not serve, DETACHED where one that mattered has
-        come to where kappa_n <= 0, NO_RAY and TRUNCATED where none comes.
+        Matrix (n, n), 1/L, usable as an array, with errors, statuses, and the geodesics of each pair. The status of a
+        pair is CAUSTIC if geodesics merge and beams are not valid, DETACHED if a significant geodesic meets
+        kappa_n <= 0, and NO_RAY or TRUNCATED if no geodesic connects the ports.
 
     Raises
     ------

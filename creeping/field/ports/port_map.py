@@ -38,14 +38,15 @@ BLOCK = 512
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PortField(PointField):
-    """Field on a hard body of a unit source e^{ikr}/(4 pi r) on it; it acts as the array of its values.
+    """Field on a hard body of a unit source e^{ikr}/(4 pi r) on the body; usable as the array of its values.
 
     Attributes
     ----------
     points, values, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
-        As of every field at points; values and error 1/L, infinite at the source; ``method`` is "rays", or "beams"
-        where these merge, "none" at the source.
+        As for every field at points. Values and error, 1/L, are infinite at the source. ``method`` is "rays", "beams"
+        near caustics, or "none" at the source.
     source : (3,), L
+        Position of the source.
 
     Examples
     --------
@@ -64,7 +65,7 @@ class PortField(PointField):
         return power(self.length_unit, -1)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Values, error and status with names, one row a point: an ``xarray.Dataset``."""
+        """``xarray.Dataset`` of values, error and status, one row per point."""
         return point_dataset(self, ()).assign_attrs(source=self.source.tolist())
 
 
@@ -78,12 +79,12 @@ def port_field(
     order: int = 2,
     length: float | Literal["auto"] = AUTO,
 ) -> PortField:
-    """Field on a hard body of a unit point source e^{ikr}/(4 pi r) on it: `coupling` of one port with many.
+    """Field on a hard body of a unit point source e^{ikr}/(4 pi r) on the body: `coupling` of one port with many.
 
     Parameters
     ----------
     body : Surface
-        Smooth and plain.
+        Smooth and without a speed.
     source : (3,), L
         On the body.
     points : (..., 3), L
@@ -92,7 +93,7 @@ def port_field(
     boundary : "hard"
     order : 2 or 1
     length : float or "auto", L
-        As of `coupling`.
+        Length up to which geodesics are traced, as for `coupling`.
 
     Returns
     -------

@@ -72,7 +72,7 @@ def t_matrix(
     store: str | Path | None = None,
     progress: Callable[[str], None] | bool | None = None,
 ) -> TMatrix:
-    """What a body scatters of every incident wave at once, by its integral equation.
+    """T-matrix of a body, which gives the scattering of every incident wave, from the integral equation.
 
     Parameters
     ----------
@@ -81,17 +81,17 @@ def t_matrix(
     wavenumber : float, 1/L
     boundary : "soft", "hard", "pec" or ImpedanceBoundary
     center : (3,), L, optional
-        Of the spherical waves; the middle of the body's bounds unless given.
+        Centre of the spherical waves; by default the centre of the body's bounding box.
     order : int, optional
-        Highest degree of the waves; by default far fields err by less than 1e-4 of the largest for want of higher ones.
+        Highest degree of the waves. By default truncation changes far fields by less than 1e-4 of the largest.
     seconds : float
-        What it may take, about, with all cores; more is refused before it starts.
+        Approximate limit of the run time on all cores. An error is raised before the start if it would be exceeded.
     store : path, optional
-        Folder in which solved columns are stored as they come, and the matrix at the end: a call that was ended goes on
-        there, and one that has been made before is answered from there. Matrices of many wavenumbers, boundaries and
-        bodies may share it, and several processes may fill it, e.g. one for each frequency.
+        Folder for solved columns, stored as they are computed, and for the finished matrix. An interrupted call resumes
+        from it, and a repeated call reads its result. Matrices of several wavenumbers, boundaries and bodies may share
+        a folder, and several processes may fill it, e.g. one per frequency.
     progress : callable or bool, optional
-        Is told in words what is done, with the number of nodes, the time and the memory that it takes; True shows it.
+        Called with a line of text before each step, with the number of nodes, the time and the memory; True shows them.
 
     Returns
     -------
@@ -100,10 +100,10 @@ def t_matrix(
     Raises
     ------
     InvalidInputError
-        On bad arguments, for a weighted body, if it would take more time or memory than it may, and if the boundary
-        varies and there is a store, which could not know it again.
+        On bad arguments, for a weighted body, if the solution would exceed the limits of time or memory, or if a store
+        is given for an admittance that varies, which the store cannot identify.
     SurfaceError
-        If the body has no mesh.
+        If the body cannot be meshed.
 
     Examples
     --------
@@ -140,7 +140,7 @@ def t_matrix(
         if store is None:
             return made(*_computed(body, k, kind, middle, highest, seconds, tell, not_kept))
         if kinds[0].varies:
-            raise InvalidInputError("a boundary that varies cannot be told from others in a store; leave out store=")
+            raise InvalidInputError("a store cannot identify an admittance that varies; leave out store=")
         key = {"body": fingerprint(body), "wavenumber": k, "boundary": boundary_name(boundary), "order": highest}
         parts = Parts(folder_path(store, "store"), key | {"center": middle.tolist(), "version": __version__})
 
@@ -175,7 +175,7 @@ def _computed(
     if plan.seconds > seconds:
         raise InvalidInputError(
             f"{what} takes about {plan.seconds:.2g} s, more than the {seconds:g} s that it may take; give seconds=, "
-            "or a lower wavenumber; creeping.solve and rays serve for few incidences"
+            "or a lower wavenumber; for few incidences use creeping.solve or rays"
         )
     tell(f"{what}: about {plan.seconds:.2g} s and {plan.memory / 1e9:.2g} GB")
     # what it was begun with, whatever memory is free now

@@ -35,31 +35,31 @@ ALIAS = 12
 
 
 class Pattern(NamedTuple):
-    """Far fields and their errors, L: by incidence and direction, of a conductor (..., scattered, incident)."""
+    """Far fields and their errors, L, by incidence and direction; for a conductor (..., scattered, incident)."""
 
     values: ComplexArray
     error: FloatArray
 
 
 class Sections(NamedTuple):
-    """Cross sections, L^2: by incidence, of a conductor (m, 2) for E0 along theta and phi."""
+    """Cross sections, L^2, by incidence (m,); for a conductor (m, 2), with E0 along theta and phi."""
 
     scattering: FloatArray
     extinction: FloatArray
 
     @property
     def absorption(self) -> FloatArray:
-        """Extinction less scattering."""
+        """Extinction minus scattering."""
         return np.asarray(self.extinction - self.scattering)
 
 
 class Averages(NamedTuple):
-    """Means over all orientations of the body, L^2, and of a conductor over both polarisations.
+    """Cross sections, L^2, averaged over all orientations of the body and, for a conductor, over both polarisations.
 
     Attributes
     ----------
     backscattering, scattering, extinction : float
-        Of 4 pi |f(d, -d)|^2, of a conductor both polarisations scattered added, and of those cross sections.
+        Backscattering is 4 pi |f(d, -d)|^2, summed over both scattered polarisations for a conductor.
     """
 
     backscattering: float

@@ -53,32 +53,33 @@ VALUE = 80.0
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TMatrix:
-    """What a body scatters of every incident wave, as a matrix between spherical waves about a centre.
+    """T-matrix of a body: scattered spherical waves for each incident spherical wave about a centre.
 
-    Waves and their numbers are those of `creeping.field.tmatrix.spherical_waves`, which treams and acoustotreams share.
+    Definition and order of the waves are those of `creeping.field.tmatrix.spherical_waves`, treams and acoustotreams.
 
     Attributes
     ----------
     matrix : ((L + 1)^2,) * 2 or (2 L (L + 2),) * 2 complex
-        From incoming regular to outgoing waves; of a conductor electric and magnetic multipoles of E in turn.
+        Maps regular incident waves to outgoing waves. For a conductor electric and magnetic multipoles of E alternate.
     wavenumber : float, 1/L
     center : (3,), L
+        Centre of the spherical waves.
     boundary : str
     vector : bool
-        Whether of E (a conductor), else of a scalar field.
+        True for the electric field E (a conductor), False for a scalar field.
     body : str
-        What it is of, in words.
+        Description of the body.
     extinction : float
-        What is left of plane waves inside the body, rms over all incidences, as a share; NaN where it is not known.
+        Extinction error: rms residual field of plane waves inside the body, relative to them; NaN if not known.
     absorbing : bool
-        Whether the body absorbs: then it need not be unitary.
+        Whether the body absorbs; if so, S need not be unitary.
     unit : str
-        Of lengths: "m" where the body knows it, else "L".
+        Unit of length: "m" if the body states it, else "L".
 
     Raises
     ------
     InvalidInputError
-        If the matrix has a size that no order has, or values that are not finite.
+        If the size of the matrix fits no order, or values are not finite.
 
     Examples
     --------
@@ -110,7 +111,7 @@ class TMatrix:
             raise InvalidInputError(
                 f"a T-matrix has shape {T.shape}; "
                 + ("2 L (L + 2) vector waves" if self.vector else "(L + 1)^2 waves")
-                + " in and out of an order L are needed"
+                + " of an order L are needed on each axis"
             )
         if not np.all(np.isfinite(T)):
             raise InvalidInputError(f"{int(np.sum(~np.isfinite(T)))} values of a T-matrix are not finite")
@@ -140,23 +141,23 @@ class TMatrix:
 
     @property
     def reciprocity(self) -> float:
-        """What f(d, r) and f(-r, -d) differ by, as a share of f, rms over all pairs of directions."""
+        """Rms of f(d, r) - f(-r, -d) over all pairs of directions, divided by the rms of f."""
         return self._lack.reciprocity
 
     @property
     def unitarity(self) -> float:
-        """Norm of S*S - 1 over that of S - 1; NaN of a body that absorbs."""
+        """Norm of S*S - 1 divided by the norm of S - 1, S = 1 + 2 T; NaN for a body that absorbs."""
         return self._lack.unitarity
 
     @property
     def error(self) -> float:
-        """Error of f, L, rms over all pairs of directions, that 95 of 100 keep to; `bistatic` has it by direction."""
+        """Error of f, L, meant to cover 95 % of all pairs of directions; `bistatic` gives the error of each pair."""
         return self._lack.error
 
     # --- far fields
 
     def bistatic(self, directions: ArrayLike, observation: ArrayLike, *, pairs: bool = False) -> Pattern:
-        """Far fields f(d, r) of all incidences in all directions, or of pairs.
+        """Far fields f(d, r) for all incidences and all directions of observation, or for pairs of them.
 
         Parameters
         ----------
@@ -165,17 +166,17 @@ class TMatrix:
         observation : (3,) or (n, 3)
             From the body to the observers.
         pairs : bool
-            Whether one direction belongs to one incidence, m = n.
+            Pair each incidence with one direction of observation, m = n.
 
         Returns
         -------
         Pattern
-            (m, n), or (m,) of pairs; of a conductor (m, n, 2, 2): theta and phi scattered, theta and phi incident.
+            (m, n), or (m,) for pairs; for a conductor (m, n, 2, 2): scattered (theta, phi) by incident (theta, phi).
 
         Raises
         ------
         InvalidInputError
-            On bad directions, if numbers of pairs differ, and if the result takes more memory than it may.
+            On bad directions, if pairs do not match in number, and if the result exceeds the memory limit.
         """
         flag(pairs, "pairs")
         d = unit_directions(directions, "directions of incidence").reshape(-1, 3)
@@ -210,22 +211,22 @@ class TMatrix:
         return Pattern(*((found, error) if self.vector else (found[..., 0, 0], error[..., 0, 0])))
 
     def far_field(self, direction: ArrayLike, observation: ArrayLike) -> FarField:
-        """Far field of one incidence (3,) in directions (..., 3), with its error: as of `creeping.far_field`.
+        """Far field of one incidence (3,) in directions (..., 3), with errors, as `creeping.far_field` returns it.
 
         Raises
         ------
         InvalidInputError
-            On bad directions, and for several incidences.
+            On bad directions, or if more than one incidence is given.
         """
         d = unit_directions(direction, "direction of incidence").reshape(-1, 3)
         if len(d) != 1:
-            raise InvalidInputError(f"far_field is of one incidence, not {len(d)}; far_fields is of many")
+            raise InvalidInputError(f"far_field takes one incidence, not {len(d)}; far_fields takes several")
         return next(self.far_fields(d, observation))
 
     def far_fields(self, directions: ArrayLike, observation: ArrayLike) -> Iterator[FarField]:
-        """Far field of each incidence (m, 3) in the directions (..., 3), one after the other.
+        """Iterate over the incidences (m, 3): the far field of each in the directions (..., 3).
 
-        Waves are made once for all of them, as far as the memory holds the fields together.
+        Incidences are computed in blocks as large as the memory allows.
 
         Raises
         ------
@@ -239,9 +240,9 @@ class TMatrix:
             yield from (self._far(r, *each) for each in zip(found.values, found.error, strict=True))
 
     def backscatter(self, directions: ArrayLike) -> FarField:
-        """Far field of each incidence (m, 3) back to where it comes from, in directions -d.
+        """Backscatter of each incidence d (m, 3): the far field in direction -d.
 
-        Of many directions it is a Fourier series in both angles, made once, after which each costs little.
+        For many incidences a Fourier series in both angles is computed once and then evaluated for each.
         """
         d = unit_directions(directions, "directions of incidence").reshape(-1, 3)
         error = self._lack.backward_error(d)
@@ -291,7 +292,7 @@ class TMatrix:
     # --- cross sections
 
     def cross_sections(self, directions: ArrayLike) -> Sections:
-        """Scattering, extinction and absorption cross sections, L^2, of incidences (m, 3), which need not be unit."""
+        """Scattering, extinction and absorption cross sections, L^2, for incidences (m, 3), which need not be unit."""
         d = unit_directions(directions, "directions of incidence").reshape(-1, 3)
         scattering, extinction = [], []
         for first in range(0, len(d), PAIRS):
@@ -305,7 +306,7 @@ class TMatrix:
         return Sections(*(part if self.vector else part[:, 0] for part in both))
 
     def orientation_average(self) -> Averages:
-        """Means over all orientations of the body: of backscattering, scattering and extinction."""
+        """Backscattering, scattering and extinction cross sections, L^2, averaged over all orientations of the body."""
         T, k, L = self.matrix, self.wavenumber, self.order
         share = (2 if self.vector else 4) * np.pi / k**2
         # |f|^2 is of degree 4L: Gauss's rule over cos theta, Parseval's sum over phi
@@ -317,12 +318,12 @@ class TMatrix:
     # --- other places
 
     def rotate(self, rotation: ArrayLike) -> TMatrix:
-        """That of the body turned about the origin by a rotation (3, 3), which takes its points x, L, to R x.
+        """T-matrix of the body rotated about the origin: R (3, 3) takes each point x of the body to R x.
 
         Raises
         ------
         InvalidInputError
-            If it is no rotation.
+            If the matrix is not a rotation.
         """
         R = real_array(rotation, "rotation")
         if R.shape != (3, 3) or np.max(np.abs(R @ R.T - np.eye(3))) > ORTHOGONAL or np.linalg.det(R) < 0:
@@ -331,7 +332,7 @@ class TMatrix:
         return replace(self, matrix=T, center=R @ self.center, body=self._moved("turned"))
 
     def translate(self, shift: ArrayLike) -> TMatrix:
-        """That of the body moved by a vector (3,), L: its centre moves along.
+        """T-matrix of the body shifted by a vector (3,), L; the centre of the waves moves with the body.
 
         Raises
         ------
@@ -344,14 +345,14 @@ class TMatrix:
         return replace(self, center=self.center + v, body=self._moved("moved"))
 
     def about(self, center: ArrayLike, order: int | None = None) -> TMatrix:
-        """That of the same body by waves about another centre (3,), L.
+        """T-matrix of the same body in spherical waves about another centre (3,), L.
 
-        Unless given, the order is that of a body of which the new centre is farther away.
+        By default the order grows by k times the distance of the two centres.
 
         Raises
         ------
         InvalidInputError
-            If the centre is not three numbers, the order no whole number, or the matrix too large.
+            If the centre is not three numbers, the order is not a whole number, or the matrix is too large.
         """
         c = real_array(center, "center")
         if c.shape != (3,):
@@ -369,20 +370,20 @@ class TMatrix:
     # --- other shapes
 
     def to_xarray(self) -> xarray.Dataset:
-        """The matrix with names on its axes: degree and order of each wave, of a conductor its polarisation too."""
+        """``xarray.Dataset`` of the matrix by degree and order of the waves and, for a conductor, polarisation."""
         from creeping.field.tmatrix.stored import as_dataset
 
         return as_dataset(self)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write it as an HDF5 file that treams reads: see `creeping.field.tmatrix.stored`."""
+        """Write an HDF5 file that treams reads; `creeping.field.tmatrix.stored` describes the format."""
         from creeping.field.tmatrix.stored import write_t_matrix
 
         write_t_matrix(self, path)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> TMatrix:
-        """Read what `save` or treams has written."""
+        """Read an HDF5 file written by `save` or by treams."""
         from creeping.field.tmatrix.stored import read_t_matrix
 
         return cls(**read_t_matrix(path))

@@ -55,29 +55,29 @@ def choose_flow(
     cache: bool | str | Path = True,
     progress: Progress | None = None,
 ) -> PhaseMap | DirectFlow:
-    """Choose the flow that carries rays fastest, its preparation included.
+    """Choose the flow that traces the rays fastest, including the time to prepare a map.
 
     Parameters
     ----------
     body : Surface
     n_rays : int
-        Rays of all incidences together.
+        Total number of rays of all incidences.
     length : float, L (travel time for a weighted body)
     tolerance : float
         Rms error of (x, p) at the end of the rays, 1e-12 to 1e-1.
     n_steps : int
-        Equally spaced points wanted on each ray.
+        Number of equally spaced points wanted on each ray.
     carry_jacobi : bool
-        Whether the Jacobi matrix is wanted, as by fans.
+        Whether the flow must carry the Jacobi matrix, which fans need.
     cache : bool or path
-        As for `build_phase_map`; a map in the cache costs nothing to build.
+        As for `build_phase_map`. A cached map counts as free.
     progress : callable, optional
-        Called with a line of text before each long step, and with the reason of the choice.
+        Called with a line of text before each long step, and with the reason for the choice.
 
     Returns
     -------
     PhaseMap or DirectFlow
-        Its horizon is ``length/n_steps`` or divides it. Always direct for bodies without kernels.
+        Its horizon divides ``length/n_steps``. Bodies without compiled kernels always get a `DirectFlow`.
 
     Raises
     ------

@@ -52,34 +52,35 @@ def build_phase_map(
     ----------
     body : Surface
     tolerance : float, optional
-        Rms error, 1e-9 to 1e-1, of one g_T0, or with ``length`` of the final state; chooses whatever of horizon, grid,
-        degree and precision is not given. 1e-6 if neither tolerance nor grid is given.
+        Rms error, 1e-9 to 1e-1, of one g_T0 or, with ``length``, of the state at the end of the rays. It determines
+        those of horizon, grid, degree and precision that are not given. 1e-6 if neither tolerance nor grid is given.
     length : float, optional, L (travel time for a weighted body)
-        Length of the rays that shall meet the tolerance; the horizon is as long as pays.
+        Length of the rays that must meet the tolerance; the horizon is chosen for the least cost.
     n_steps : int
-        Equally spaced points of a ray that are wanted, with ``length``: the horizon divides their distance.
+        Number of equally spaced points wanted on a ray of ``length``; the horizon divides their spacing.
     n_rays : int
-        Rays to come, in all: what a build may cost follows from it.
+        Total number of rays to be traced, which determines how costly the map may be.
     horizon : float, optional
         T0, L (travel time for a weighted body).
     grid : (nodes, angles) or (nodes_u, nodes_v, angles), optional
-        Nodes per chart, margin included, and on the circle. The chart of a body of revolution is a meridian, from pole
-        to pole where it has poles: ``nodes_u``, of the azimuth, is not used.
+        Nodes per chart, including its margin, and angles of direction on the circle. For a body of revolution the chart
+        is a meridian, from pole to pole if there are poles, and ``nodes_u``, for the azimuth, is not used.
     degree : int, optional
         Degree of the splines, 3 or 5.
     precision : {"single", "double"}, optional
-        Of the stored coefficients; sums are in double. With a tolerance single where that is exact enough, else double.
+        Precision of the stored coefficients; sums are in double. By default double or, with a tolerance, single where
+        single is accurate enough.
     carry_jacobi : bool
         Whether to carry the Jacobi matrix, which fans need.
     method : {"direct", "tower"}
-        "tower" is Algorithm 1 and needs ``time_step``, ``stages``, ``horizon`` and ``grid``; it stores (x, p) in space,
-        as the paper does.
+        "tower" is Algorithm 1 of the paper. It needs ``time_step``, ``stages``, ``horizon`` and ``grid``, and stores
+        (x, p) as Cartesian vectors, as in the paper.
     time_step : float, optional
-        tau of the burn-in.
+        Time step tau of the initial map, for "tower".
     stages : int, optional
         S, the number of levels of the tower.
     cache : bool or path
-        True: the user's cache folder; a path: that folder; False: no cache.
+        True uses the cache folder of the user, a path another folder; False disables the cache.
     progress : callable, optional
         Called with a line of text before each long step.
 
@@ -93,7 +94,7 @@ def build_phase_map(
     InvalidInputError
         On parameters that contradict each other.
     ToleranceError
-        If no map within the limits reaches the tolerance; says what was reached and how to go on.
+        If no map within the limits reaches the tolerance. The message states the error reached and a remedy.
 
     Examples
     --------
