@@ -37,9 +37,9 @@ CUT = 0.1
 """Width of the tile next to an edge or tip, over that of the one it is cut from."""
 WIDE, WIDE_CUT = 1.0, 0.5
 """Side and cut of coarse tiles: far fields of cylinders err by 0.005 to 0.03 % of the largest amplitude."""
-NEAR, NEAR_COARSE = 1.7, 1.4
-"""Distance of points from the middle of a tile, over its size, from which its nodes serve alone, and of coarse tiles:
-with 1.4 entries of the T-matrix of a sphere err by 6e-5 of the largest, with 1.7 by 2e-5."""
+NEAR, NEAR_FEW = 1.4, 1.7
+"""Distance of points from the middle of a tile, over its size, beyond which its nodes are summed: of four nodes a side
+or more, and of fewer. Between 1.4 and 1.7 entries of the T-matrix of a sphere, ka = 10, change by 2e-8."""
 APART, RULE = 1.0, 5
 """Distance of the middles of parts of a tile from a point, over their size, at least, and the points of their rule: of
 coarse tiles one fewer."""
@@ -172,9 +172,8 @@ class Tiles:
         """Where the points (m, 3) near each tile stand (t + 1,), and their numbers (pairs,)."""
         from scipy.spatial import cKDTree
 
-        lists = cKDTree(points).query_ball_point(
-            self.middles, (NEAR_COARSE if self.p == POINTS - 1 else NEAR) * self.sizes
-        )
+        reach = NEAR if self.p >= POINTS - 1 else NEAR_FEW
+        lists = cKDTree(points).query_ball_point(self.middles, reach * self.sizes)
         counts = np.array([len(one) for one in lists], dtype=np.int64)
         targets = np.concatenate([np.sort(one) for one in lists]).astype(np.int64) if counts.any() else counts[:0]
         return np.concatenate([[0], np.cumsum(counts)]), targets

@@ -110,7 +110,7 @@ def test_a_sweep_solves_each_frequency_once_for_all_incidences(monkeypatch):
 
     monkeypatch.setattr(solving, "_solved", noted)
     body = sc.Cylinder(0.5, 1.0)
-    ds = cr.backscatter(body, wavenumbers=wavenumbers, elevation=[10.0, 50.0], boundary="hard")
+    ds = cr.backscatter(body, wavenumbers=wavenumbers, elevation=[10.0, 50.0], boundary="hard", method="equation")
     assert asked == wavenumbers.tolist()
     up = np.radians(ds["elevation"].values.ravel())
     one = found[0].backscatter()
