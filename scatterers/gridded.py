@@ -115,7 +115,7 @@ class Gridded(LevelBody):
         margin : float
             Margin added on every side of the bounding box, as a fraction of its half width.
         centre : (3,) array_like, optional
-            As for `Gridded`.
+            Interior point, L, as for `Gridded`.
 
         Raises
         ------

@@ -318,7 +318,7 @@ class TMatrix:
     # --- other places
 
     def rotate(self, rotation: ArrayLike) -> TMatrix:
-        """T-matrix of the body rotated about the origin: R (3, 3) takes each point x of the body to R x.
+        """T-matrix of the body rotated about the origin: R (3, 3) takes each point x, L, to R x.
 
         Raises
         ------
