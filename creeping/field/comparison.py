@@ -110,7 +110,8 @@ def compare(
     values, levels : (n,), degrees or Hz, and dB
         Computed angles or frequencies, ascending, and levels. Sample finely: levels are interpolated at the reference.
     reference_values, reference : (m,)
-        Reference, in the units of ``values`` and ``levels``. Points that are not finite or lie outside the computed range are left out.
+        Reference, in the units of ``values`` and ``levels``. Points that are not finite or lie outside the computed
+        range are left out.
     low, high : (n,), dB, optional
         Levels that the stated error allows.
     align : float, degrees or Hz
