@@ -8,7 +8,7 @@ from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked_across
 from creeping.field.boundary import BoundaryLike, boundary_name
-from creeping.field.equation.effort import ASKED, is_large, plan_of
+from creeping.field.equation.effort import ASKED, plan_of
 from creeping.field.tmatrix.computing import expected
 from creeping.field.validity_range import is_reached
 from creeping.geodesics.equations import points_of_charts
@@ -121,17 +121,14 @@ def forecast(
         takes = _takes(sum(one.seconds for one in plan), plan[-1].memory)
         return Forecast(body, f"the T-matrix of the body, one for all angles, {takes}, {SOLVED}", 0)
     smooth = not (without or pieces)
-    if smooth and is_large(shape, top, boundary) and method != "equation":
-        nodes, refused, equation = 0, "it is too large", ""
-    else:
-        solved = plan_of(shape, top, boundary, ASKED if method == "equation" else None, incidences=count)
-        if without and solved.refused:
-            solved = plan_of(shape, top, boundary, ASKED, incidences=count)
-        # nodes grow with the area in square wavelengths, and what pairs of them take with the square of that
-        share = float(np.sum((k / top) ** 4))
-        nodes, refused = solved.nodes, solved.refused
-        takes = _takes(share * solved.seconds, solved.memory)
-        equation = f"the integral equation between {nodes} nodes, {takes}, {COARSE if solved.effort.coarse else SOLVED}"
+    solved = plan_of(shape, top, boundary, ASKED if method == "equation" else None, incidences=count)
+    if without and solved.refused:
+        solved = plan_of(shape, top, boundary, ASKED, incidences=count)
+    # nodes grow with the area in square wavelengths, and what pairs of them take with the square of that
+    share = float(np.sum((k / top) ** 4))
+    nodes, refused = solved.nodes, solved.refused
+    takes = _takes(share * solved.seconds, solved.memory)
+    equation = f"the integral equation between {nodes} nodes, {takes}, {COARSE if solved.effort.coarse else SOLVED}"
     if not refused and (not smooth or method == "equation"):
         by = equation
     elif without:

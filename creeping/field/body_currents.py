@@ -22,7 +22,7 @@ from creeping.field.currents.radiation import grid_cells, transformed
 from creeping.field.currents.whole_body import POINTS as POINTS_INSIDE
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
-from creeping.field.equation.effort import expected_seconds_of, is_large
+from creeping.field.equation.effort import expected_seconds_of, too_much
 from creeping.field.equation.solving import Solved, asked_solution, solution_for
 from creeping.geometry.arguments import one_of
 from creeping.geometry.piecewise import has_edges, is_piecewise
@@ -221,7 +221,7 @@ def solved_currents(fan: RayFan, wavenumber: float, boundary: BoundaryLike) -> S
 
     So fields far, near and on the body go one way. Nothing is made where the equation would cost too much.
     """
-    if is_large(fan.body, wavenumber, boundary) or not affordable(fan, POINTS_INSIDE, wavenumber):
+    if too_much(fan.body, wavenumber, boundary) or not affordable(fan, POINTS_INSIDE, wavenumber):
         return None
     try:
         found = cached_currents(fan, wavenumber, boundary)

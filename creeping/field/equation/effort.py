@@ -15,15 +15,14 @@ from typing import NamedTuple
 import numpy as np
 
 from creeping.errors import SurfaceError
-from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, scalar_boundaries
+from creeping.field.boundary import CONDUCTOR, HARD, Boundary, BoundaryLike, scalar_boundaries
 from creeping.field.equation.body_tiles import body_tiles
 from creeping.field.equation.columns import STEPS, TOGETHER, is_dense
 from creeping.field.equation.matrix import EACH, VECTOR
 from creeping.field.equation.split_sums import CURL, ONE_LAYER, TWO_LAYERS, SmoothKernel, best_split
-from creeping.field.equation.tiles import POINTS, SIDE, WIDE, Tiles
+from creeping.field.equation.tiles import Tiles
 from creeping.geometry.memo import memo
-from creeping.geometry.quadrature import node_count
-from creeping.geometry.surface import Surface
+from creeping.geometry.surface import Surface, size
 from creeping.kernels.threads import thread_count
 from creeping.storage.memory import budget
 
@@ -33,6 +32,8 @@ PRODUCTS = 20
 """Products with the matrix, about, that an incidence takes to the tolerance."""
 LEAST_STEPS, MOST_STEPS = 3, 10
 """Steps of GMRES from the currents of optics on: fewer serve no one, and more change nothing that coarse tiles know."""
+FEWEST = 10.0
+"""Nodes that a square wavelength has at least: 12 by the widest of coarse rules, squares of 2 x 2 nodes, less SLACK."""
 PER_NODE, PER_SQUARE = 1.4e-4, 1.4e-5
 """Seconds of a core that integrals over tiles near to a node take, and more for each node of a tile."""
 NEAR_CURVED, NEAR_FLAT = 2.3, 1.3
@@ -84,46 +85,41 @@ def plan_of(
 
     Those are SECONDS if they are not given. What is told is for all incidences.
     """
-    allowed, kind = SECONDS if seconds is None else seconds, equation_boundary(boundary)
+    allowed = SECONDS if seconds is None else seconds
+    try:
+        return _plan(body, wavenumber, equation_boundary(boundary), allowed, incidences, together)
+    except SurfaceError as error:
+        return Plan(0, np.inf, np.inf, str(error))
+
+
+def _plan(body: Surface, wavenumber: float, kind: Boundary, allowed: float, incidences: int, together: bool) -> Plan:
     columns, asked = incidences * kind_columns(kind), (incidences if together else 1) * kind_columns(kind)
-    refused, first = "", Plan(0, np.inf, np.inf, "")
-    for coarse in (False, True):
-        try:
-            load = load_of(body, wavenumber, kind, coarse=coarse)
-        except SurfaceError as error:
-            return Plan(0, np.inf, np.inf, str(error))
+    fewest = int(FEWEST * _area(body) * (wavenumber / (2 * np.pi)) ** 2)
+    least = near_seconds(fewest, 1, kind, flat=True)
+    plan = Plan(fewest, least, 0.0, f"at least {fewest} nodes take about {least:.2g} s, more than {allowed:g}")
+    for coarse in (False, True) if least <= allowed else ():
+        load = load_of(body, wavenumber, kind, coarse=coarse)
         # of incidences their values and changes, and what GMRES keeps
         memory = load.memory + 64.0 * load.nodes * incidences * (6 if kind.kind == "conductor" else 1) + TOGETHER
         products = PRODUCTS
         if coarse:
-            products = int(min(MOST_STEPS + 1, (allowed - load.seconds) / max(asked * load.product, 1e-9)))
-        effort = Effort(True, products - 1) if coarse else FULL
-        plan = Plan(load.nodes, load.seconds + products * columns * load.product, memory, "", effort)
+            room = (allowed - load.seconds) / max(asked * load.product, 1e-9)
+            products = int(min(MOST_STEPS + 1, max(LEAST_STEPS + 1, room)))
+        takes, refused = load.seconds + products * asked * load.product, ""
         if memory > budget():
-            refused = refused or f"{load.nodes} nodes take {memory / 1e9:.2g} GB"
-        elif coarse and effort.steps < LEAST_STEPS:
-            takes = load.seconds + (LEAST_STEPS + 1) * asked * load.product
+            refused = f"{load.nodes} nodes take {memory / 1e9:.2g} GB"
+        elif takes > allowed:
             refused = f"{load.nodes} nodes take about {takes:.2g} s, more than {allowed:g}"
-        elif coarse or load.seconds + products * asked * load.product <= allowed:
-            return plan
-        first = plan
-    return first._replace(refused=refused)
+        effort = Effort(True, products - 1) if coarse else FULL
+        plan = Plan(load.nodes, load.seconds + products * columns * load.product, memory, refused, effort)
+        if not refused:
+            break
+    return plan
 
 
 def too_much(body: Surface, wavenumber: float, boundary: BoundaryLike, seconds: float | None = None) -> str:
     """Why the equation of one incidence takes too much time or memory, or cannot be; nothing if it does not."""
     return plan_of(body, wavenumber, boundary, seconds).refused
-
-
-def is_large(body: Surface, wavenumber: float, boundary: BoundaryLike) -> bool:
-    """Whether the equation of one incidence costs more than SECONDS; of large bodies told without making tiles."""
-    kind = equation_boundary(boundary)
-    # quadrature of the currents has no more than twice the nodes of fine tiles
-    p = POINTS - 1
-    least = 0.5 * node_count(body, wavenumber) * (p * SIDE / (POINTS * WIDE)) ** 2
-    if near_seconds(least, p, kind, flat=True) > SECONDS:
-        return True
-    return bool(too_much(body, wavenumber, boundary))
 
 
 def expected_seconds_of(body: Surface, wavenumber: float, boundary: BoundaryLike) -> float:
@@ -147,6 +143,12 @@ def near_seconds(nodes: float, p: int, kind: Boundary, *, flat: bool) -> float:
     """Seconds of integrals over tiles of p x p nodes near to the nodes and to the points beneath them."""
     vector = (NEAR_FLAT if flat else NEAR_CURVED) if kind.kind == "conductor" else 1.0
     return nodes * (PER_NODE + PER_SQUARE * p**2) * vector / thread_count()
+
+
+def _area(body: Surface) -> float:
+    """Area of a body, L^2, by the widest tiles that it has."""
+    wavenumber = 2 * np.pi / size(body)
+    return memo(body, "area", lambda: float(body_tiles(body, wavenumber, HARD, coarse=True).weights.sum()))
 
 
 def load_of(body: Surface, wavenumber: float, kind: Boundary, *, coarse: bool = False) -> Load:
@@ -173,11 +175,11 @@ def load_on(tiles: Tiles, wavenumber: float, kind: Boundary) -> Load:
     """What the equation takes on tiles."""
     nodes, vector = len(tiles.points), kind.kind == "conductor"
     near = near_seconds(nodes, tiles.p, kind, flat=tiles.planar)
+    entries = float(nodes) ** 2 * (4 if vector else 1)
+    # the matrix and its transpose
+    whole = 16 * entries
     if is_dense(nodes, kind):
-        entries = float(nodes) ** 2 * (4 if vector else 1)
-        made = near + pair_seconds(nodes, kind)
-        # the matrix and its transpose
-        return Load(nodes, near, made, PER_ENTRY * entries / thread_count(), 16 * entries)
+        return Load(nodes, near, near + pair_seconds(nodes, kind), PER_ENTRY * entries / thread_count(), whole)
     load = CURL if vector else ONE_LAYER if kind.kind in ("soft", "hard") else TWO_LAYERS
     widths = np.ptp(tiles.points, axis=0)
     # as many points beneath the nodes
@@ -185,6 +187,6 @@ def load_on(tiles: Tiles, wavenumber: float, kind: Boundary) -> Load:
     best = best_split(lambda a: SmoothKernel(wavenumber, widths, a), places, tiles.points, load, np.inf)
     sparse = 2e4 * nodes * (4 if vector else 1) * max(tiles.p, 2) ** 2 / 25
     if best is None:
-        return Load(nodes, near, near, np.inf, np.inf)
+        return Load(nodes, near, near, np.inf, whole)
     # a split sum of a conductor is of two columns
     return Load(nodes, near, near, best.seconds / (2 if vector else 1), best.memory + sparse)
