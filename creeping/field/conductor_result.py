@@ -112,8 +112,9 @@ class ConductorCurrent(ArrayResult, PointData):
     Attributes
     ----------
     points, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
-        As for every field at points. ``method`` is "lit" (the lit side's expansion), "rays" (creeping modes), "beams"
-        (near caustics), or, in the penumbra, "lit+rays" or "lit+beams".
+        As for every field at points. ``method`` is "lit" (the lit side's expansion), "march"
+        (waves marched along rays, with beams near caustics), "rays" (creeping modes), or, in the penumbra, "lit+march"
+        or "lit+rays".
     values : (..., 3) or (..., 3, 2) complex
     charge : (...) or (..., 2) complex
         n.E = div J/(ik): surface charge density over the permittivity of free space, in units of the incident E.
@@ -134,7 +135,7 @@ class ConductorCurrent(ArrayResult, PointData):
     >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=4.0, n_rays=24)
     >>> J = cr.conductor_current(fan, [(0, 0, -1), (0, 0.6, 0.8)], wavenumber=30.0, polarisation=(1, 0, 0))
     >>> J.shape, np.abs(J[0]).round(1).tolist(), J.method.tolist()                   # 2 n x H where the wave falls in
-    ((2, 3), [2.0, 0.0, 0.0], ['lit', 'beams'])
+    ((2, 3), [2.0, 0.0, 0.0], ['lit', 'march'])
     """
 
     values: ComplexArray

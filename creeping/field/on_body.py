@@ -100,9 +100,9 @@ def surface_field(
         Creeping modes give it up to detachment and marching beyond; the fan of a point source, whose incident wave is
         e^{ikR}/(4 pi R), has modes only. It is infinite at caustics of the ray (status CAUSTIC), and 0 after the ray
         has ended (DETACHED) or if the wave did not launch the ray (NO_RAY). With points (...): the total field. In
-        the shadow it is the sum over all rays through a point, or 0 if no ray passes (NO_RAY or TRUNCATED). Creeping
-        modes or marching with beams are used, whichever has the smaller error (``method``); marching continues across
-        caustics and beyond detachment.
+        the shadow it is the sum over all rays through a point, or 0 if no ray passes (NO_RAY or TRUNCATED). Waves are
+        marched, with beams where rays merge, and so continue across caustics and beyond detachment; creeping modes
+        are used where marching is impossible or takes more than a minute, and for order 1 (``method``).
 
     Raises
     ------
@@ -162,12 +162,12 @@ def surface_field(
 def rays_on(
     fan: RayFan, points: FloatArray, k: float, kind: Boundary, order: int, share: FloatArray | None = None
 ) -> tuple[RaySum, Words]:
-    """Creeping waves at points of the body (n, 3), by modes or by marching, whichever states less, and which it was.
+    """Creeping waves at points of the body (n, 3), and the method: the march where it is possible, else modes.
 
     ``share`` (n,) is that of rays that have just left the line.
     """
-    alone = march_alone(fan.body, kind)
-    if alone and not marches(fan, kind, order, len(points), k):
+    marched = marches(fan, kind, order, len(points), k)
+    if march_alone(fan.body, kind) and not marched:
         nothing = np.zeros(len(points))
         none = RaySum(nothing.astype(complex), nothing, np.full(len(points), int(FieldStatus.NO_RAY)), nothing)
         return none, np.full(len(points), "none")
@@ -175,25 +175,15 @@ def rays_on(
     young = np.zeros(len(found.observer), dtype=bool)
     if share is not None:
         young = fock_parameter(found.rays, k) < TAKEN_OVER
-    if alone:
+    if marched:
         return marched_sum(fan, found, points, share, young, k, kind), np.full(len(points), "march")
     waves, other = (surface_waves(found.rays, k, kind, o) for o in (order, 3 - order))
     if share is not None:
         weight = np.where(young, share[found.observer], 1.0)
         # a wave may be infinite
         waves, other = (np.where(weight > 0, wave * np.where(weight > 0, weight, 1.0), 0.0) for wave in (waves, other))
-    by_modes = ray_sum(fan, found, len(points), waves, own_error(found.rays, (waves, other), k, kind, order), k, kind)
-    method = np.full(len(points), "rays")
-    if not marches(fan, kind, order, len(points), k):
-        return by_modes, method
-    marched = marched_sum(fan, found, points, share, young, k, kind)
-    ok = marched.status == FieldStatus.OK
-    # where neither is to be trusted the march knows of more waves
-    gone = (by_modes.status == FieldStatus.DETACHED) & (marched.status == FieldStatus.DETACHED)
-    gone &= True if share is None else share > 0
-    better = gone | (ok & ((by_modes.status != FieldStatus.OK) | (marched.error < by_modes.error)))
-    chosen = (np.where(better, its, mine) for its, mine in zip(marched.parts, by_modes.parts, strict=True))
-    return RaySum(*chosen), np.where(better, "march", method)
+    error = own_error(found.rays, (waves, other), k, kind, order)
+    return ray_sum(fan, found, len(points), waves, error, k, kind), np.full(len(points), "rays")
 
 
 def total_on(

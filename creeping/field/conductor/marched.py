@@ -1,48 +1,75 @@
-"""The current of a conductor by marched waves: beyond the end of creeping modes, and where their rays merge.
+"""The current of a conductor by marched waves, with beams that carry vectors where their rays merge.
 
     u: H along b, u_n + kappa_t u = 0,   v: dE/dn along b, E = 0
-    J = sum [-h (u + ...) p + (j - i e kappa_t1 u/(kJ)) b],   j = (i/k) e v
+    J = sum over rays of u V - i e kappa_t1 u/(kJ) b
+    J = sum of beams of u with V + M n V',   V = -h (1 + T C) p - t rho j p + (j + h t rho C) b,   V' = -h b
     error^2 = (|h| e_u)^2 + (|e| e_v/k)^2 + [A max(1, r) |u|/m^4]^2 + [B |u|/m^2]^2
 
-as of `creeping.field.conductor.vector_waves`, C = 0, with m and r = rho kappa_t of the launch point. The condition of u
-is that of E along the ray, (curl H)_p = 0 on the body. A stands for what both scalar problems leave out of Maxwell's,
-B for what passes from one to the other where the body twists.
+with j = (i/k) e v/u, C = Du/(2 m^2 u) of creeping modes, 0 where they have ended, and the rest as in
+`creeping.field.currents.conductor`; m and r = rho kappa_t in the error are of the launch point. The condition of u is
+that of E along the ray, (curl H)_p = 0 on the body. The beam of u turns by M n, so that -h (p + M n b) is
+(i/k) grad (h u): beside a ray that is its -e (i kappa_t1/(kJ)) u b, which grows without bound where J = 0, and the sum
+does not. A stands for what both scalar problems leave out of Maxwell's, B for what passes from one to the other where
+the body twists.
 
-Sources: [C93], [P82]; Derivations, F22 and F31. A and B were set on a sphere, three ellipsoids, an egg and the twisted
-ellipsoid.
+Sources: [C93], [P82]; Derivations, F22, F24, F26 and F31. A and B were set on a sphere, three ellipsoids, an egg and
+the twisted ellipsoid.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from creeping._typing import BoolArray, ComplexArray, FloatArray
+from creeping._typing import BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.arguments import scales, transverse_ratios
 from creeping.field.beams import STRONG, beams_beside_rays, blended_sum, variation
 from creeping.field.boundary import ELECTRIC_HARD, SOFT
-from creeping.field.conductor.vector_waves import VectorWaves
-from creeping.field.currents.conductor import spread_of, turn_of, vectors_of
+from creeping.field.currents.conductor import amplitudes, ray_scalars, spread_of, turn_of, vectors_of
 from creeping.field.marching.fan_rays import FLAT
 from creeping.field.marching.fan_waves import FanWaves, fan_waves, marches, spread_out
 from creeping.field.ray_sums import RaySum
 from creeping.field.shed_wave import smoothstep
+from creeping.field.strip_waves import StripTable, resampled, without_tubes
 from creeping.geometry.quadrature import BodyNodes, nodes_at
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan
+from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays
+from creeping.rays.strips import Strip
 
 NEXT, MIXED = 0.5, 0.25
 """A and B."""
 LEAST = 1e-9
-"""Size of u below which v is no share of it."""
+"""Size of u below which v and Du are no shares of it."""
 
 
 @dataclass(frozen=True, eq=False)
-class MarchedWaves(VectorWaves):
-    """Marched waves of a conductor on the strips of a fan: u and v."""
+class MarchedWaves:
+    """Marched waves of a conductor on the strips of a fan, u and v, for incident E0 (3, p): what beams are made of.
+
+    Attributes
+    ----------
+    hard, soft : FanWaves
+        u and v.
+    direction : (3,)
+    electric : (3, p) complex
+    """
 
     hard: FanWaves
     soft: FanWaves
+    direction: FloatArray
+    electric: ComplexArray
+
+    @property
+    def strips(self) -> tuple[Strip, ...]:
+        """Strips of the fan."""
+        return self.hard.strips
+
+    @property
+    def wavenumber(self) -> float:
+        """K, 1/L."""
+        return self.hard.wavenumber
 
     def at(self, strip: int, sigma: FloatArray, s: FloatArray) -> ComplexArray:
         """Y of u at places (n,) of a strip: (n,)."""
@@ -52,24 +79,45 @@ class MarchedWaves(VectorWaves):
         """Its derivative in s, 1/L: (n,)."""
         return self.hard.slope(strip, sigma, s)
 
-    def across(self, strip: int, sigma: FloatArray, s: FloatArray) -> ComplexArray:
-        """Its derivative in sigma, 1/L: (n,)."""
-        return self.hard.across(strip, sigma, s)
-
     def lean(self, strip: int, sigma: FloatArray, s: FloatArray) -> FloatArray:
         """Lambda at places (n,) of a strip: (n,)."""
         return self.hard.lean(strip, sigma, s)
 
-    def ratios(self, strip: int, sigma: FloatArray, s: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-        """(i/k) v/u and 0 at places (n,) of a strip."""
+    def heights(self, strip: int, sigma: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """H and e (n, p) of the incident waves where rays at places (n,) of a strip begin."""
+        rays, back = self._starts(strip, sigma)
+        axes = np.broadcast_to(self.direction, rays.first_normal.shape)
+        h, e = amplitudes(rays.first_normal, axes, self.direction, self.electric)
+        return h[back], e[back]
+
+    def components(
+        self, strip: int, sigma: FloatArray, s: FloatArray, nodes: BodyNodes, p: FloatArray
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """V and V' (n, 3 p) of the beams at places (n,) of a strip, at nodes with tangents p (n, 3)."""
+        (h, e), (rays, back) = self.heights(strip, sigma), self._starts(strip, sigma)
+        b = np.cross(nodes.normals, p)
+        turn = faded(nodes.curvature(p), nodes.twist(p), rays.curvature[1][back])
         u, v = self.hard.at(strip, sigma, s), self.soft.at(strip, sigma, s)
         ratio = np.where(np.abs(u) > LEAST, 1j / self.wavenumber * v / np.where(np.abs(u) > LEAST, u, 1.0), 0.0)
-        return ratio, np.zeros_like(ratio)
+        V = vectors_of(p, b, h, e * ratio[:, None], np.ones(len(p)), turn, self.changing.at(strip, sigma, s))
+        lean = -b[:, :, None] * h[:, None]
+        return V.reshape(len(p), -1), lean.reshape(len(p), -1)
 
-    def turn(self, strip: int, sigma: FloatArray, nodes: BodyNodes, p: FloatArray) -> FloatArray:
-        """T rho of tangents p (n, 3) at nodes, of rays at places (n,) of a strip, 0 on flat and concave surfaces."""
-        rays, back = self.starts(strip, sigma)
-        return faded(nodes.curvature(p), nodes.twist(p), rays.curvature[1][back])
+    @cached_property
+    def changing(self) -> StripTable:
+        """C of creeping modes, 0 where they have ended."""
+        table = []
+        for strip in self.strips:
+            alive, ratio = strip.rays.alive, np.zeros(strip.rays.alive.shape, dtype=complex)
+            hard, _, changing = ray_scalars(without_tubes(strip.rays)[alive], self.wavenumber, 2)
+            ratio[alive] = np.where(np.abs(hard) > LEAST, changing / np.where(np.abs(hard) > LEAST, hard, 1.0), 0.0)
+            table.append(resampled(strip, ratio, self.hard.times))
+        return StripTable(self.strips, self.hard.times, table)
+
+    def _starts(self, strip: int, sigma: FloatArray) -> tuple[RayPoints, IntArray]:
+        """Where rays at places (n,) of a strip begin, each once, and which of these belongs to each place (n,)."""
+        distinct, back = np.unique(sigma, return_inverse=True)
+        return self.strips[strip].at(distinct, np.zeros(len(distinct))), back
 
 
 def faded(curvature: FloatArray, twist: FloatArray, first: FloatArray) -> FloatArray:
@@ -98,7 +146,7 @@ def marched_current(
     """
     k, observer = wavenumber, shed.observer
     hard, soft = (fan_waves(fan, wavenumber=k, boundary=kind) for kind in (ELECTRIC_HARD, SOFT))
-    waves = MarchedWaves(hard.strips, hard.times, k, fan.line.direction, electric, hard, soft)
+    waves = MarchedWaves(hard, soft, fan.line.direction, electric)
     J, size, part, y, slope = _on_rays(fan.body, waves, shed, points, normals)
     tube = spread_out(np.ones(len(observer), dtype=complex), shed.rays, k)
     weight = np.where(young, share[observer], 1.0)
@@ -132,20 +180,21 @@ def _on_rays(
     And y and dy/dsigma of u (m,).
     """
     k, rays, count = waves.wavenumber, shed.rays, len(shed.sigma)
-    y, v, slope = np.zeros((3, count), dtype=complex)
+    y, v, slope, changing = np.zeros((4, count), dtype=complex)
     h, e = np.zeros((2, count, waves.electric.shape[1]), dtype=complex)
     off_u, off_v = np.zeros((2, count))
     for number in range(len(waves.strips)):
         mine = np.flatnonzero(shed.strip == number)
         at = number, shed.sigma[mine], rays.time[mine]
-        y[mine], v[mine], slope[mine] = waves.at(*at), waves.soft.at(*at), waves.across(*at)
+        y[mine], v[mine], slope[mine] = waves.at(*at), waves.soft.at(*at), waves.hard.across(*at)
+        changing[mine] = waves.changing.at(*at)
         off_u[mine], off_v[mine] = waves.hard.error(*at), waves.soft.error(*at)
         h[mine], e[mine] = waves.heights(number, shed.sigma[mine])
     nodes = nodes_at(body, points[shed.observer], normals[shed.observer])
     p = rays.directions
     across = e * (1j / k * v - 1j / k * rays.transverse[0] * spread_of(rays, k) * y)[:, None]
     turn = faded(nodes.curvature(p), nodes.twist(p), rays.curvature[0])
-    J = vectors_of(p, np.cross(nodes.normals, p), h, across, y, turn, np.zeros(count, dtype=complex))
+    J = vectors_of(p, np.cross(nodes.normals, p), h, across, y, turn, y * changing)
     size = np.maximum(np.linalg.norm(J, axis=1), np.abs(y)[:, None])
     m, r = scales(rays, k)[0], np.abs(transverse_ratios(rays)[0])
     rest = np.abs(y) * np.hypot(NEXT * np.maximum(r, 1.0) / m**4, MIXED / m**2)

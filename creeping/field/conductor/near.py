@@ -354,7 +354,7 @@ def _result(
     waves = incident_fields(fan.line.direction, electric, points.reshape(-1, 3), k)
     parts: tuple[list[ComplexArray], ...] = ([], [], [])
     for i, one in enumerate(fields):
-        incident = np.where(np.isin(one.method, ("rays", "beams"))[:, None], 0.0, waves[..., i])
+        incident = np.where((one.method == "rays")[:, None], 0.0, waves[..., i])
         for part, value in zip(parts, (incident, one.wave - incident, one.creeping), strict=True):
             part.append(np.asarray(value))
     incident_, scattered, creeping = (

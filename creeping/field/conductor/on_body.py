@@ -3,70 +3,46 @@
     J = (1 - W)(J_lit + J_thrown) + sum_rays w_i J_i,  W = W(xi; 0, 0.6),  w_i = W for rays that have just left the line
     n.E = div J/(ik),   dH_n/dn = -div (J x n)
 
-J_lit and J_i are those of `creeping.field.currents.conductor`, J_thrown is what the ground receives from other parts of
-the body (`creeping.field.currents.bounce`); where rays merge beams stand for them
-(`creeping.field.conductor.on_body`). Where the integral equation is solved its solution stands for all of it, and
-n.E is that of `creeping.field.equation.currents`. Divergences are by `creeping.field.conductor.on_body`.
-Errors and statuses are those of scalar fields on the body (`creeping.field.on_body`), |J| in place of |u|; on lit
-ground BEYOND |J_thrown| stands besides, for what comes to it later. The charge of expansions has the error of J.
-
-Also here: the current of creeping waves where their rays merge, by Gaussian beams that carry vectors.
-
-Beams of `creeping.field.conductor.vector_waves`, whose waves are creeping modes of second order.
+J_lit is that of `creeping.field.currents.conductor`, J_thrown is what the surface receives from other parts of the body
+(`creeping.field.currents.bounce`). J_i is marched, with beams where rays merge (`creeping.field.conductor.marched`), or
+that of creeping modes where the march is impossible or would take too long. Where the integral equation is solved its
+solution stands for all of it, and n.E is that of `creeping.field.equation.currents`. Errors and statuses are those of
+scalar fields on the body (`creeping.field.on_body`), |J| in place of |u|; on the lit side BEYOND |J_thrown| stands
+besides, for what comes to it later. The charge of expansions has the error of J.
 
 Also here: surface divergence of a tangential field on a body, by its differences between points to either side.
 
-    div v = Σ_t t.[v(x + h t) - v(x - h t)]/2h,   t two tangents at x, kh = CLOSE
+    div v = sum_t t.[v(x + h t) - v(x - h t)]/2h,   t two tangents at x, kh = CLOSE
 
-Sources: [CK13, sec. 6.2]; [P82]; Derivations, F18, F26 and F24.
+Sources: [CK13, sec. 6.2]; [P82]; Derivations, F18, F24 and F26.
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
+from creeping._typing import ComplexArray, FloatArray
 from creeping.field.arguments import fock_parameter
-from creeping.field.beams import STRONG, beams_beside_rays, blended_sum, seconds, variation
 from creeping.field.boundary import CONDUCTOR, ELECTRIC_HARD
 from creeping.field.conductor.marched import current_marches, marched_current
-from creeping.field.conductor.vector_waves import VectorWaves
-from creeping.field.currents.conductor import ConductorCurrents, lit_vectors, ray_scalars, ray_vectors
+from creeping.field.currents.conductor import ConductorCurrents, lit_vectors, ray_vectors
 from creeping.field.currents.nodes import TAKEN_OVER, axes_of_incidence, lit_part
 from creeping.field.equation.currents import ON_BODY, ConductorTileCurrents, along_body
 from creeping.field.far_geometry import fan_strips
 from creeping.field.lit_ground import composed, convex, lit_error
-from creeping.field.point_result import LEAST_WORTH, WORTH, FieldStatus, PointValues, Words, measured_field
+from creeping.field.point_result import PointValues, Words, measured_field
 from creeping.field.ray_sums import RaySum, own_error, ray_sum, total_of
-from creeping.field.strip_waves import StripTable, modes_on_strip, resampled, without_tubes
 from creeping.field.surface import surface_waves
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.quadrature import nodes_at
 from creeping.geometry.surface import Surface, normal, project, size
 from creeping.rays.fan import RayFan
 from creeping.rays.quantities import RayPoints
-from creeping.rays.shedding import ShedRays, shed_on
-from creeping.rays.status import RayStatus
+from creeping.rays.shedding import shed_on
 
-MERGED = 1e-3
-"""Error of the sum over rays, as a share of the incident wave, from which beams are asked."""
-FAVOUR = {"beams": 1.0, "march": 0.3}
-"""Share of the error of what serves already, below which another sum takes its place: where modes hold they know more
-of a conductor than what is marched does."""
 BEYOND = 1.0
 """What the ground receives later than at first, to and fro and by shed rays, as a share of what it does at first."""
-WORST = 0.99
-"""Error of a ray, as a share of it, at most: one that has ended is none of those that beams are made of."""
-
-STEPS = 12.0
-"""Steps a wavelength at which waves are kept along rays."""
-FEWEST = 8
-"""Rays of a strip from which waves are interpolated between them."""
-LONGEST = 60.0
-"""Seconds that beams may take."""
-
 CLOSE = 0.02
 """kh: expansions are smooth to rounding."""
 
@@ -179,10 +155,10 @@ def _by_expansions(
         lit_off[at] = np.hypot(lit_off[at], BEYOND * np.linalg.norm(thrown, axis=1))
     rays, by = _rays_at(fan, around, normals, k, electric, 1 - share)
     served, total = [], np.empty_like(lit)
-    for i, (sums, method) in enumerate(zip(rays, by, strict=True)):
+    for i, sums in enumerate(rays):
         centre = RaySum(sums.values[:count], sums.error, sums.status, sums.faded)
         parts = lit[:count, :, i], lit_off[:count, i], share[:count]
-        one = composed(fan, parts, centre, method, float(left[i]), k, CONDUCTOR, 1.0)
+        one = composed(fan, parts, centre, by, float(left[i]), k, CONDUCTOR, 1.0)
         served.append(one)
         # what is left out at a point is left out around it
         dropped = np.all(one.creeping == 0, axis=1) | ~np.all(np.isfinite(sums.values[:count]), axis=1)
@@ -218,214 +194,37 @@ def _rays_at(
     k: float,
     electric: ComplexArray,
     share: FloatArray,
-) -> tuple[list[RaySum], list[Words]]:
+) -> tuple[list[RaySum], Words]:
     """Sums over rays at points and around them (5n, 3), with the error and status of the points alone (n,).
 
-    One for each polarisation, and what serves at each point; ``share`` (5n,) is that of rays next to the line.
+    One for each polarisation, and the method; ``share`` (5n,) is that of rays next to the line.
     """
     count = len(around) // 5
     found = shed_on(fan_strips(fan), fan.body, around)
+    young = fock_parameter(found.rays, k) < TAKEN_OVER
+    if current_marches(fan, len(around), k):
+        sums = marched_current(fan, found, around, normals, share, young, k, electric)
+        few = [RaySum(one.values, one.error[:count], one.status[:count], one.faded[:count]) for one in sums]
+        return few, np.full(count, "march")
     of = normals[found.observer]
     # rays pass through points of the body that differ from those of the strip by its error alone
     twist = nodes_at(fan.body, around[found.observer], of).twist(found.rays.directions)
-    young = fock_parameter(found.rays, k) < TAKEN_OVER
     weight = np.where(young, share[found.observer], 1.0)[:, None, None]
     with np.errstate(invalid="ignore"):
         waves, other = (weight * ray_vectors(found.rays, of, twist, fan.line.direction, electric, k, o) for o in (2, 1))
     waves, other = (np.where(weight > 0, wave, 0.0) for wave in (waves, other))
     middle = found.observer < count
     strength = _strength(found.rays, weight, k)
-    sums, methods, parts = [], [], []
+    sums = []
     for i in range(electric.shape[1]):
         pair = waves[middle, :, i], other[middle, :, i]
         own = own_error(found.rays[middle], pair, k, CONDUCTOR, 2, mixed=strength[middle])
         one = ray_sum(fan, found[middle], count, pair[0], own, k, ELECTRIC_HARD, strength[middle])
         sums.append(replace(one, values=total_of(waves[:, :, i], found.observer, 5 * count)))
-        methods.append(np.full(count, "rays"))
-        parts.append(own)
-    asked = np.any([(one.status == FieldStatus.CAUSTIC) | (one.error > MERGED) for one in sums], axis=0)
-    at = np.flatnonzero(asked)
-    if len(at) and beams_serve(fan, 5 * len(at), k):
-        by_beams = _beams_at(fan, around, at, found, (waves, strength, weight[:, 0, 0]), share, k, electric)
-        _take_better(sums, methods, by_beams, at, "beams")
-    at = np.flatnonzero(np.any([(one.status != FieldStatus.OK) | (one.error > MERGED) for one in sums], axis=0))
-    if len(at) and current_marches(fan, 5 * len(at), k):
-        rows, shed, mine = _found_at(found, len(around), at)
-        marched = marched_current(fan, shed, around[rows], normals[rows], share[rows], young[mine], k, electric)
-        its = [replace(one, **_of_points(one, len(at))) for one in marched]
-        _take_better(sums, methods, its, at, "march")
-    return sums, methods
-
-
-def _found_at(found: ShedRays, total: int, at: IntArray) -> tuple[IntArray, ShedRays, BoolArray]:
-    """Rows of the points ``at`` and of those around them among (5n,), their rays, and which of all rays these are."""
-    count = total // 5
-    rows = np.concatenate([at + block * count for block in range(5)])
-    row = np.full(total, -1)
-    row[rows] = np.arange(len(rows))
-    mine = row[found.observer] >= 0
-    return rows, replace(found[mine], observer=row[found.observer[mine]]), mine
-
-
-def _of_points(one: RaySum, few: int) -> dict[str, Any]:
-    """Error, status and what has faded of the points alone."""
-    return {name: getattr(one, name)[:few] for name in ("error", "status", "faded")}
-
-
-def _take_better(sums: list[RaySum], methods: list[Words], others: list[RaySum], at: IntArray, name: str) -> None:
-    """Put other sums in place of those that are not OK or err more, at the points ``at`` of each polarisation.
-
-    Where rays have ended and no sum is OK the march knows of more waves.
-    """
-    for i, its in enumerate(others):
-        mine = sums[i]
-        status, error = mine.status[at], mine.error[at]
-        # what is worth little by itself is replaced by anything that is worth more
-        size = np.linalg.norm(mine.values[at], axis=1)
-        poor = error > np.maximum(WORTH * size, LEAST_WORTH)
-        less = np.where(poor, error, FAVOUR[name] * error)
-        better = (its.status == FieldStatus.OK) & ((status != FieldStatus.OK) | (its.error < less))
-        better |= (name == "march") & (status == FieldStatus.DETACHED) & (its.status == FieldStatus.DETACHED)
-        sums[i], methods[i] = _taken(mine, its, at, at[better], methods[i], name)
+    return sums, np.full(count, "rays")
 
 
 def _strength(rays: RayPoints, weight: FloatArray, k: float) -> FloatArray:
     """|u| of rays (m,): what their currents of either polarisation are made of."""
     with np.errstate(invalid="ignore"):
         return np.where(weight[:, 0, 0] > 0, np.abs(surface_waves(rays, k, ELECTRIC_HARD, 1)) * weight[:, 0, 0], 0.0)
-
-
-def _taken(mine: RaySum, its: RaySum, at: IntArray, better: IntArray, method: Words, name: str) -> tuple[RaySum, Words]:
-    """A sum with another, at points ``at`` and around them, in its place at the points ``better``."""
-    count = len(mine.status)
-    row = np.full(count, -1)
-    row[at] = np.arange(len(at))
-    values, error, status = mine.values.copy(), mine.error.copy(), mine.status.copy()
-    for block in range(5):
-        values[better + block * count] = its.values[row[better] + block * len(at)]
-    error[better], status[better] = its.error[row[better]], its.status[row[better]]
-    method = method.astype("<U8")
-    method[better] = name
-    return RaySum(values, error, status, mine.faded), method
-
-
-def _beams_at(
-    fan: RayFan,
-    around: FloatArray,
-    at: IntArray,
-    found: ShedRays,
-    waves: tuple[ComplexArray, FloatArray, FloatArray],
-    share: FloatArray,
-    k: float,
-    electric: ComplexArray,
-) -> list[RaySum]:
-    """Sums of beams at the points ``at`` and around them, each with the error and status of the points alone.
-
-    ``waves`` of the rays found are J (m, 3, p), |u| (m,), and their weights (m,).
-    """
-    few, p = len(at), electric.shape[1]
-    rows, shed, mine = _found_at(found, len(around), at)
-    J, strength, weight = waves[0][mine], waves[1][mine], waves[2][mine]
-    # an infinite wave is that of a caustic: beams serve there
-    own, strength = np.where(np.isfinite(J), J, 0.0), np.where(np.isfinite(strength), strength, 0.0)
-    beams = mode_waves_of(fan, k, electric)
-    sums = beams_beside_rays(
-        fan, beams, shed, around[rows], own.reshape(len(own), 3 * p), share[rows], beams.components
-    )
-    y, across = np.zeros((2, len(shed.sigma)), dtype=complex)
-    for number in range(len(beams.strips)):
-        these = np.flatnonzero(shed.strip == number)
-        place = number, shed.sigma[these], shed.rays.time[these]
-        y[these], across[these] = beams.at(*place), beams.across(*place)
-    eta, n = variation(fan, shed, y, across, k), normal(fan.body, around[rows])
-    large, part = _without_caustics(fan, shed, around[rows], k, electric)
-    with np.errstate(divide="ignore"):
-        large = large * (weight * np.minimum(np.abs(shed.rays.spreading) ** -0.5, STRONG))[:, None]
-    out = []
-    for i in range(p):
-        both = sums[0].reshape(-1, 3, p)[:, :, i], sums[1].reshape(-1, 3, p)[:, :, i]
-        whole = blended_sum(fan, shed, own[:, :, i], strength, large[:, i], part[:, i], eta, both, k, ELECTRIC_HARD)
-        # feet of beams have tangents of their own
-        tangential = whole.values - np.sum(n * whole.values, axis=1, keepdims=True) * n
-        out.append(RaySum(tangential, whole.error[:few], whole.status[:few], whole.faded[:few]))
-    return out
-
-
-def _without_caustics(
-    fan: RayFan, shed: ShedRays, points: FloatArray, k: float, electric: ComplexArray
-) -> tuple[FloatArray, FloatArray]:
-    """Size of each ray's J but for its tube, at least |u|, and the error of J as a share of that: (m, p) each."""
-    rays, x = without_tubes(shed.rays), points[shed.observer]
-    n = normal(fan.body, x)
-    twist = nodes_at(fan.body, x, n).twist(rays.directions)
-    pair = [ray_vectors(rays, n, twist, fan.line.direction, electric, k, o) for o in (2, 1)]
-    u = np.abs(surface_waves(rays, k, ELECTRIC_HARD, 1))
-    large = np.maximum(np.linalg.norm(pair[0], axis=1), u[:, None])
-    off = [
-        own_error(rays, (pair[0][:, :, i], pair[1][:, :, i]), k, CONDUCTOR, 2, mixed=u)
-        for i in range(electric.shape[1])
-    ]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return large, np.nan_to_num(np.minimum(np.stack(off, axis=1) / large, WORST))
-
-
-class ModeWaves(VectorWaves):
-    """Creeping modes of a conductor."""
-
-    def at(self, strip: int, sigma: FloatArray, s: FloatArray) -> ComplexArray:
-        """Y of u at places (n,) of a strip: (n,)."""
-        return self._hard.at(strip, sigma, s)
-
-    def slope(self, strip: int, sigma: FloatArray, s: FloatArray) -> ComplexArray:
-        """Its derivative in s, 1/L: (n,)."""
-        return self._hard.at(strip, sigma, s, ds=1)
-
-    def across(self, strip: int, sigma: FloatArray, s: FloatArray) -> ComplexArray:
-        """Its derivative in sigma, 1/L: (n,)."""
-        return self._hard.at(strip, sigma, s, dsigma=1)
-
-    def lean(self, strip: int, sigma: FloatArray, s: FloatArray) -> FloatArray:
-        """0 (n,): modes know nothing of what varies across their rays."""
-        return np.zeros(sigma.shape)
-
-    def ratios(self, strip: int, sigma: FloatArray, s: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-        """(i/k) v/u and Du/(2 m^2 u) at places (n,) of a strip."""
-        soft, changing = (table.at(strip, sigma, s) for table in self._ratios)
-        return soft, changing
-
-    @cached_property
-    def _hard(self) -> StripTable:
-        found = [modes_on_strip(strip, self.times, self.wavenumber, ELECTRIC_HARD)[0] for strip in self.strips]
-        return StripTable(self.strips, self.times, found)
-
-    @cached_property
-    def _ratios(self) -> tuple[StripTable, StripTable]:
-        """(i/k) v/u and Du/(2 m^2 u) on the strips' rays."""
-        tables: tuple[list[ComplexArray], list[ComplexArray]] = ([], [])
-        for strip in self.strips:
-            hard, soft, changing = ray_scalars(without_tubes(strip.rays), self.wavenumber, 2)
-            for table, wave in zip(tables, (soft, changing), strict=True):
-                with np.errstate(divide="ignore", invalid="ignore"):
-                    ratio = np.where(np.abs(hard) > 0, wave / hard, 0.0)
-                table.append(resampled(strip, ratio, self.times))
-        soft_table, changing_table = (StripTable(self.strips, self.times, table) for table in tables)
-        return soft_table, changing_table
-
-
-def mode_waves_of(fan: RayFan, wavenumber: float, electric: ComplexArray) -> ModeWaves:
-    """Creeping modes of a conductor on a fan."""
-    count = max(64, int(np.ceil(STEPS * fan.length * wavenumber / (2 * np.pi))))
-    times = np.linspace(0.0, fan.length, count + 1)
-    return ModeWaves(fan_strips(fan), times, wavenumber, fan.line.direction, electric)
-
-
-def beams_serve(fan: RayFan, count: int, wavenumber: float) -> bool:
-    """Whether beams can be made of a fan's modes, and cost little enough at ``count`` points."""
-    strips = fan_strips(fan)
-    return (
-        len(strips) > 0
-        and sum(len(strip.positions) for strip in strips) == len(fan.status)
-        and min(len(strip.positions) for strip in strips) >= FEWEST
-        and bool(np.all(fan.status == RayStatus.OK))
-        and seconds(fan, strips, wavenumber, count) < LONGEST
-    )

@@ -6,7 +6,6 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.field.boundary import ELECTRIC_HARD, HARD
-from creeping.field.conductor import on_body
 from creeping.field.equation import effort
 from creeping.field.marching.fan_waves import fan_waves
 from creeping.field.strip_waves import modes_on_strip
@@ -27,9 +26,7 @@ def test_the_wave_with_e_along_the_normal_has_a_condition_of_its_own(ball):
     assert off.max() < 0.03 and np.all(wrong > 4 * off)
 
 
-def test_marching_is_mie_on_the_sphere(ball, mie, rng, monkeypatch):
-    monkeypatch.setattr(on_body, "MERGED", -1.0)
-    monkeypatch.setattr(on_body, "FAVOUR", {"beams": 0.0, "march": np.inf})
+def test_marching_is_mie_on_the_sphere(ball, mie, rng):
     x = rng.normal(size=(60, 3))
     x /= np.linalg.norm(x, axis=1, keepdims=True)
     found = cr.conductor_current(ball, x, wavenumber=K)

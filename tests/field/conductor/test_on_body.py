@@ -63,10 +63,10 @@ def test_the_focus_behind_a_sphere(ball, mie):
     x /= np.linalg.norm(x, axis=1, keepdims=True)
     E, H = mie(30.0, x)
     found = cr.conductor_current(ball, x, wavenumber=30.0)
-    assert set(found.method.ravel()) == {"beams"} and np.all(found.ok)
+    assert set(found.method.ravel()) == {"march"} and np.all(found.ok)
     off, _ = wrong(found, x, E, H)
     # the current there is a third of the incident wave, by rays infinite
-    assert np.linalg.norm(H, axis=1).min() > 0.25 and off.max() < 2e-3
+    assert np.linalg.norm(H, axis=1).min() > 0.25 and off.max() < 4e-3 and np.all(off <= found.error)
 
 
 @pytest.mark.slow
@@ -100,11 +100,11 @@ def test_polarisations(ball, rng):
         one = cr.conductor_current(ball, x, wavenumber=30.0, polarisation=given)
         assert one.shape == (8, 3) and one.error.shape == one.charge.shape == one.status.shape == (8,)
         np.testing.assert_allclose(np.linalg.norm(one.incident_electric), 1.0)
-        # rays and beams are chosen by their error, which is the polarisation's own
+        # rays and beams are blended by their error, which is the polarisation's own
         off = np.linalg.norm(one - both @ np.array(mix), axis=1)
         assert np.all(off <= one.error + np.abs(both.error @ np.abs(mix)))
-        same = np.isin(one.method, ("lit", "lit+rays"))
-        assert np.any(same) and off[same].max() < 1e-12
+        same = one.method == "lit"
+        assert np.any(same) and off[same].max() < 1e-6
 
 
 @pytest.mark.parametrize(
