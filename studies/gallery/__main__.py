@@ -17,10 +17,15 @@ def main(arguments: list[str] | None = None) -> None:
         "-o", dest="folder", metavar="DIR", type=Path, default=Path("out/site"), help="folder (%(default)s)"
     )
     parser.add_argument("--quick", action="store_true", help="coarser figures, drawn faster")
+    parser.add_argument("--pages-only", action="store_true", help="no figures")
     given = parser.parse_args(arguments)
     try:
         page = build_site(
-            given.folder, given.names, quick=given.quick, progress=lambda text: print(text, file=sys.stderr)
+            given.folder,
+            given.names,
+            quick=given.quick,
+            pages_only=given.pages_only,
+            progress=lambda text: print(text, file=sys.stderr),
         )
     except CreepingError as error:
         print(f"studies.gallery: {error}", file=sys.stderr)

@@ -19,16 +19,15 @@ from typing import Any
 import studies
 from creeping import CreepingError, InvalidInputError
 from creeping._version import __version__
+from studies.gallery.reference import write_reference
 
 PAGES = Path(__file__).parent / "pages"
 THUMBNAIL = 480
 """Pixels of the width of a thumbnail."""
 STYLE = """\
-div.body { min-width: 0; max-width: none; }
-div.body table.docutils { font-size: 0.9em; margin-left: 0; }
-div.body table.thumbnails { border: 0; font-size: 0.85em; }
-div.body table.thumbnails td { border: 0; vertical-align: top; width: 33%; }
-div.highlight pre { font-size: 0.74em; overflow-x: auto; padding: 7px 12px; margin: 15px 0; }
+table.docutils { display: block; overflow-x: auto; max-width: 100%; }
+article table.thumbnails td { vertical-align: top; width: 33%; }
+.highlight pre { overflow-x: auto; }
 img { max-width: 100%; height: auto; background: white; }
 """
 CONFIGURATION: dict[str, Any] = {
@@ -36,23 +35,26 @@ CONFIGURATION: dict[str, Any] = {
     "copyright": "the creeping developers",
     "version": __version__,
     "release": __version__,
-    "extensions": ["myst_parser"],
+    "extensions": ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"],
+    "autodoc_default_options": {"members": True, "exclude-members": "__init__, __new__"},
+    "autodoc_typehints": "none",
+    "autodoc_class_signature": "mixed",
+    "napoleon_google_docstring": False,
+    "napoleon_use_ivar": True,
+    "napoleon_use_rtype": False,
+    # attributes of several results have one name
+    "suppress_warnings": ["ref.python"],
     "myst_heading_anchors": 3,
     "smartquotes": False,
-    "html_theme": "alabaster",
-    "html_theme_options": {
-        "description": "Creeping rays and the diffracted field on smooth bodies",
-        "page_width": "1280px",
-        "sidebar_width": "230px",
-        "fixed_sidebar": True,
-        "show_powered_by": False,
-    },
-    "html_sidebars": {"**": ["about.html", "searchfield.html", "navigation.html"]},
+    "html_theme": "furo",
+    "html_title": "creeping",
     "html_static_path": ["style"],
+    "html_css_files": ["custom.css"],
     "html_copy_source": False,
     "html_show_sourcelink": False,
     "html_scaled_image_link": False,
 }
+"""The theme has its fonts, scripts and a dark palette with it."""
 
 COLUMNS = 3
 """Thumbnails in a row."""
@@ -66,9 +68,10 @@ def build_site(
     names: Sequence[str] = (),
     *,
     quick: bool = False,
+    pages_only: bool = False,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Path:
-    """Draw figures and build the site of pages and gallery.
+    """Draw figures and build the site of pages, reference and gallery.
 
     Parameters
     ----------
@@ -78,6 +81,8 @@ def build_site(
         Figures; all of `studies.FIGURES` if there are none.
     quick : bool
         Coarser figures, drawn faster.
+    pages_only : bool
+        Draw no figures: the gallery stays empty.
     progress : callable
         Called with a line of text for each figure and before Sphinx starts.
 
@@ -93,7 +98,7 @@ def build_site(
     CreepingError
         If Sphinx is missing or warns, with its warnings.
     """
-    missing = [package for package in ("sphinx", "myst_parser") if find_spec(package) is None]
+    missing = [package for package in ("sphinx", "myst_parser", "furo") if find_spec(package) is None]
     if missing:
         raise CreepingError(f"the site needs {' and '.join(missing)}: pip install 'creeping[docs]'")
     unknown = [name for name in names if name not in studies.FIGURES]
@@ -101,7 +106,7 @@ def build_site(
         raise InvalidInputError(f"unknown figures {', '.join(unknown)}; figures are {', '.join(studies.FIGURES)}")
     folder = Path(folder).absolute()
     cards = []
-    for name in dict.fromkeys(names) or studies.FIGURES:
+    for name in () if pages_only else dict.fromkeys(names) or studies.FIGURES:
         cards.append(studies.draw(name, folder / "figures", quick=quick))
         progress(f"{name}  {cards[-1]['seconds']:.1f} s  {cards[-1]['headline']}")
     progress("pages")
@@ -127,6 +132,7 @@ def gather(sources: Path, cards: list[dict[str, Any]], figures: Path) -> None:
         page = figure_page(card, inspect.getdoc(function) or "", path, inspect.getsource(module))
         (sources / "gallery" / f"{card['name']}.md").write_text(page, encoding="utf-8")
     (sources / "gallery" / "index.md").write_text(gallery_page(cards), encoding="utf-8")
+    write_reference(sources / "reference")
 
 
 def thumbnail(picture: Path, target: Path) -> None:
@@ -157,12 +163,35 @@ def make_html(sources: Path, folder: Path, doctrees: Path) -> None:
             app = Sphinx(
                 sources, None, folder, doctrees, "html", CONFIGURATION, status=None, warning=warnings, freshenv=True
             )
+            # before napoleon reads them
+            app.connect("autodoc-process-docstring", _plain_lines, priority=400)
+            app.connect("autodoc-process-signature", _signature)
             app.build(force_all=True)
     except SphinxError as error:
         raise CreepingError(f"the pages cannot be built: {error}") from error
     lines = [line for line in warnings.getvalue().splitlines() if line.strip()]
     if lines or app.statuscode:
         raise CreepingError(f"{len(lines)} warnings of the pages, which must have none:\n  " + "\n  ".join(lines))
+
+
+def _plain_lines(_app: Any, _what: str, _name: str, _obj: Any, _options: Any, lines: list[str]) -> None:
+    """Keep bars and stars of formulas in docstrings from being markup; examples stay as they are."""
+    example = False
+    for number, line in enumerate(lines):
+        example = line.lstrip().startswith(">>>") or (example and bool(line.strip()))
+        if not example:
+            parts = _CODE.split(line)
+            parts[::2] = [re.sub(r"([|*])", r"\\\1", part) for part in parts[::2]]
+            lines[number] = "".join(parts)
+
+
+def _signature(
+    _app: Any, what: str, _name: str, obj: Any, _options: Any, signature: str | None, returned: str | None
+) -> tuple[str | None, str | None]:
+    """No signature of a class that users are given, not make: its docstring has no parameters."""
+    if what == "class" and "Parameters\n" not in (inspect.getdoc(obj) or ""):
+        return "", None
+    return signature, returned
 
 
 def figure_page(card: dict[str, Any], docstring: str, path: str, source: str) -> str:
@@ -213,6 +242,8 @@ def figure_page(card: dict[str, Any], docstring: str, path: str, source: str) ->
 
 def gallery_page(cards: list[dict[str, Any]]) -> str:
     """Page with a thumbnail, expected in ``thumbs``, of every figure."""
+    if not cards:
+        return "# Gallery\n\nNo figures were drawn: `python -m studies.gallery` without `--pages-only` draws them.\n"
     cells = [
         f"[![{escaped(card['title'])}](thumbs/{card['file']})]({card['name']}.md)\n\n"
         f"    [{escaped(card['title'].rstrip('.'))}]({card['name']}.md)"

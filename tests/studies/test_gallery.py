@@ -19,6 +19,7 @@ from creeping.sweeping.studyfile.study import parse_study
 from studies import __main__ as command
 from studies import tables
 from studies.gallery import building
+from studies.gallery.reference import TASKS
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted(building.PAGES.glob("*.md"))
@@ -137,6 +138,12 @@ def study_is_there(words):
     assert all(f'"{word}"' in known for word in words[1:] if word.startswith("-")), words
 
 
+@pytest.mark.parametrize("package", [creeping, scatterers], ids=lambda package: package.__name__)
+def test_every_public_name_is_in_the_reference_once(package):
+    listed = [name for _, names in TASKS.values() for name in names.get(package.__name__, "").split()]
+    assert sorted(listed) == sorted(name for name in package.__all__ if name != "__version__")
+
+
 def test_all_studies_are_listed():
     done = subprocess.run([sys.executable, "-m", "studies"], cwd=ROOT, capture_output=True, text=True, check=True)
     rows = dict(line.split(maxsplit=1) for line in done.stdout.split("\n\n")[0].splitlines())
@@ -180,7 +187,7 @@ def test_tables_are_printed_as_they_are_asked_for(capsys):
 @pytest.mark.slow
 def test_site_of_one_figure(tmp_path):
     """Built by its command, quickly: it loads nothing from a network, and shows what study and sidecar tell."""
-    for package in ("sphinx", "myst_parser"):
+    for package in ("sphinx", "myst_parser", "furo"):
         pytest.importorskip(package)
     words = [sys.executable, "-m", "studies.gallery", "-o", str(tmp_path / "site"), "--quick", CHEAP]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
@@ -202,6 +209,8 @@ def test_site_of_one_figure(tmp_path):
     assert f"Drawn in {card['seconds']:g} s." in read
     assert all(parameter.replace("_", " ") in read for parameter in card["parameters"])
     assert f'href="{CHEAP}.html"' in text_of(folder / "gallery" / "index.html")
+    assert (folder / "objects.inv").exists()
+    assert 'id="creeping.far_field"' in text_of(folder / "reference" / "fields.html")
     for page in PAGES:
         title = re.match(r"# (.*)\n", text_of(page))[1]
         assert title in html.unescape(text_of(folder / f"{page.stem}.html"))
