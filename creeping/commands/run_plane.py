@@ -16,6 +16,7 @@ from creeping.errors import InvalidInputError
 from creeping.field.body_currents import affordable
 from creeping.field.conductor.near import conductor_field
 from creeping.field.cut_result import FieldCut, cut_grid, field_cut
+from creeping.field.equation.solution import Solution
 from creeping.field.near import near_field
 from creeping.rays.fan import RayFan
 
@@ -72,7 +73,7 @@ def asked_planes(texts: Sequence[str] | None, job: Job | None) -> list[Plane]:
 def write_planes(
     planes: Sequence[Plane],
     job: Job,
-    fan: RayFan,
+    source: RayFan | Solution,
     output: Path,
     name: str,
     progress: Callable[[str], None],
@@ -80,13 +81,19 @@ def write_planes(
     pictures: bool,
     formats: Sequence[str] = ("csv",),
 ) -> tuple[list[dict[str, Any]], list[str]]:
-    """Compute fields on planes and write their files; returns entries of the summary and the names of the files."""
+    """Compute fields on planes, by a fan or a solution, and write their files.
+
+    Returns entries of the summary and the names of the files.
+    """
     entries, names = [], []
     for number, plane in enumerate(planes, 1):
         stem = "plane" if number == 1 else f"plane_{number}"
-        _tell_cost(plane, job, fan, progress)
+        grid = cut_grid(source, **_options(plane, job, source))
+        progress(f"field on the plane {plane.text}: {len(grid.points)} points")
+        if isinstance(source, RayFan):
+            _tell_time(plane, job, source, grid.points, progress)
         started = perf_counter()
-        cut = field_cut(fan, **_options(plane, job), **_polarisation(job))
+        cut = field_cut(source, **_options(plane, job, source), **_polarisation(job))
         seconds = perf_counter() - started
         if job.unit:
             cut = replace(cut, field=replace(cut.field, length_unit=job.unit))
@@ -99,12 +106,12 @@ def write_planes(
     return entries, names
 
 
-def _options(plane: Plane, job: Job) -> dict[str, Any]:
+def _options(plane: Plane, job: Job, source: RayFan | Solution) -> dict[str, Any]:
     """Arguments of `field_cut`, and of `cut_grid`."""
-    options: dict[str, Any] = {"wavenumber": job.wavenumber, "boundary": job.boundary, "order": ORDER}
-    if plane.axes is not None:
-        options |= {"across": plane.axes[0], "up": plane.axes[1]}
-    return options | {"step": plane.step}
+    options: dict[str, Any] = {"step": plane.step}
+    if isinstance(source, RayFan):
+        options |= {"wavenumber": job.wavenumber, "boundary": job.boundary, "order": ORDER}
+    return options if plane.axes is None else options | {"across": plane.axes[0], "up": plane.axes[1]}
 
 
 def _polarisation(job: Job) -> dict[str, Any]:
@@ -112,11 +119,8 @@ def _polarisation(job: Job) -> dict[str, Any]:
     return {"polarisation": {"t": "theta", "p": "phi"}[job.components[0][1]]} if job.boundary == "pec" else {}
 
 
-def _tell_cost(plane: Plane, job: Job, fan: RayFan, progress: Callable[[str], None]) -> None:
-    """Say how many points a plane has, and how long they take."""
-    grid = cut_grid(fan, **_options(plane, job))
-    points, words = grid.points, f"field on the plane {plane.text}: {len(grid.points)} points"
-    progress(words)
+def _tell_time(plane: Plane, job: Job, fan: RayFan, points: FloatArray, progress: Callable[[str], None]) -> None:
+    """Say how long the points of a plane take."""
     k = job.wavenumber
     count = max(LEAST_TRIED, min(MOST_TRIED, len(points) // TRIED))
     # of many points currents may cost too much where they serve a few
@@ -130,7 +134,7 @@ def _tell_cost(plane: Plane, job: Job, fan: RayFan, progress: Callable[[str], No
             near_field(fan, some, wavenumber=k, boundary=job.boundary, order=ORDER)
 
     seconds = expected_seconds(compute, points, count)
-    progress(f"{words}, about {seconds:.{0 if seconds >= 10 else 1}f} s")
+    progress(f"field on the plane {plane.text}: about {seconds:.{0 if seconds >= 10 else 1}f} s")
 
 
 def expected_seconds(compute: Callable[[FloatArray], None], points: FloatArray, count: int) -> float:

@@ -10,6 +10,7 @@ from creeping._version import __version__
 from creeping.commands.body import title_of
 from creeping.commands.resuming import Unfinished, kept
 from creeping.commands.run_field import Job
+from creeping.commands.run_plane import Plane, plane_words, write_planes
 from creeping.commands.run_report import wave_entry
 from creeping.errors import InvalidInputError
 from creeping.geometry.arguments import rays_refused
@@ -22,7 +23,7 @@ def run_solved(
     incident: Any,
     output: Path,
     body: str,
-    planes: Any,
+    planes: Sequence[Plane],
     formats: Sequence[str],
     pictures: bool,
     backend: str,
@@ -34,15 +35,12 @@ def run_solved(
     Raises
     ------
     InvalidInputError
-        If no field is asked for, or one of a point source or in a plane.
+        If no field is asked for, or one of a point source.
     """
     if job is None:
         raise InvalidInputError(f"{rays_refused(shape)}; give --wavenumber, --frequency or --wavelength")
-    if planes or not hasattr(incident, "direction"):
-        what = "--plane" if planes else "--source"
-        raise InvalidInputError(
-            f"{what} is of bodies with rays; {why_no_rays(shape)}: creeping.solve gives near fields"
-        )
+    if not hasattr(incident, "direction"):
+        raise InvalidInputError(f"--source is of bodies with rays; {why_no_rays(shape)}: give --direction")
     started = time.perf_counter()
     with kept(unfinished, progress.message):
         solution, far, seconds = job.solved(shape, incident.direction, progress, unfinished)
@@ -52,7 +50,10 @@ def run_solved(
         summary["field"], names = job.write(
             far, solution, output, backend, title_of(body), pictures=pictures, formats=formats
         )
-        summary["field"]["seconds"], summary["files"] = seconds, [*names, "summary.json"]
+        summary["planes"], more = write_planes(
+            planes, job, solution, output, title_of(body), progress, pictures=pictures, formats=formats
+        )
+        summary["field"]["seconds"], summary["files"] = seconds, [*names, *more, "summary.json"]
         summary["seconds"] = round(time.perf_counter() - started, 2)
         unfinished.write_summary(summary, complete=True)
         unfinished.finished()
@@ -70,6 +71,7 @@ def readable(summary: dict[str, Any], output: Path) -> str:
             f"{field['boundary']} far field in {field['directions']} directions by the integral equation between "
             f"{summary['nodes']} nodes, |f| up to {field['largest']:.4g} {field['unit']}{told}, "
             f"{field['unresolved']} unresolved",
+            *map(plane_words, summary["planes"]),
             f"{len(summary['files'])} files in {output} ({', '.join(summary['files'])}), {summary['seconds']:.1f} s",
         ]
     )

@@ -1,9 +1,4 @@
-"""What a field on a plane is: a grid of points, and the field at those outside the body.
-
-x = point + a e_1 + b e_2,   a along ``across``, b along ``up``
-
-Also here: the total field on a plane cut through a body: a rectangle of points, those outside the body with their
-field.
+"""The total field on a plane cut through a body: a rectangle of points, and the field at those outside the body.
 
     x = point + a e_1 + b e_2,   a along ``across``, b along ``up``
 
@@ -13,32 +8,32 @@ Sources: Derivations, F17 and F26.
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creeping._presenting import Drawn, brief
-from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
+from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
-from creeping.field.conductor_result import ConductorField
-from creeping.field.point_result import FieldStatus, NearField
-from creeping.geometry.surface import Surface, project
-from creeping.shadow.line import ShadowLine
-
-if TYPE_CHECKING:
-    import xarray
-
-
-from creeping._typing import ArrayLike
 from creeping.field.arguments import PLAIN, checked, checked_plain
 from creeping.field.body_currents import affordable
 from creeping.field.boundary import BoundaryLike
 from creeping.field.conductor.near import VECTOR, conductor_field
+from creeping.field.conductor_result import ConductorField
+from creeping.field.equation.solution import Solution
 from creeping.field.near import near_field
+from creeping.field.point_result import FieldStatus, NearField
 from creeping.geometry.arguments import number_between, one_of, positive_number, real_array
 from creeping.geometry.directions import unit_direction
+from creeping.geometry.parts import inside
+from creeping.geometry.surface import Surface, project
 from creeping.rays.fan import RayFan
+from creeping.shadow.line import ShadowLine
+
+if TYPE_CHECKING:
+    import xarray
 
 INSIDE = -1
 """Status on the grid where there is no field."""
@@ -59,8 +54,11 @@ class FieldCut(Drawn):
 
     Attributes
     ----------
-    line : ShadowLine
-        Shadow line of the incidence; it holds the body too.
+    body : Surface
+    direction : (3,)
+        Direction of incidence.
+    line : ShadowLine or None
+        Shadow line of the incidence; None for a cut of a `Solution`.
     point : (3,), L
         Origin of ``across`` and ``up``.
     axes : (2, 3)
@@ -86,18 +84,15 @@ class FieldCut(Drawn):
     (True, 9)
     """
 
-    line: ShadowLine
+    body: Surface
+    direction: FloatArray
+    line: ShadowLine | None
     point: FloatArray
     axes: FloatArray
     across: FloatArray
     up: FloatArray
     outside: BoolArray
     field: NearField | ConductorField
-
-    @property
-    def body(self) -> Surface:
-        """Body of the shadow line."""
-        return self.line.body
 
     @property
     def points(self) -> FloatArray:
@@ -151,7 +146,7 @@ class FieldCut(Drawn):
             return np.asarray(self.on_grid(self.field.values, complex(np.nan, np.nan)))
         own = self.field.incident_electric / np.linalg.norm(self.field.incident_electric)
         if chosen == "H":
-            own = np.cross(self.line.direction, own)
+            own = np.cross(self.direction, own)
         return np.asarray(self.on_grid(np.einsum("nc,c->n", getattr(self.field, chosen), own.conj())))
 
     def magnitude(self, quantity: str | None = None) -> FloatArray:
@@ -162,10 +157,10 @@ class FieldCut(Drawn):
         return np.asarray(self.on_grid(np.linalg.norm(getattr(self.field, chosen), axis=-1)))
 
     def shadow_points(self) -> FloatArray:
-        """Intersections of the shadow line with the rectangle: (n, 2), L, coordinates across and up."""
+        """Intersections of the shadow line, if any, with the rectangle: (n, 2), L, coordinates across and up."""
         found = [np.zeros((0, 2))]
         normal = np.cross(*self.axes)
-        for curve in self.line.curves:
+        for curve in self.line.curves if self.line else ():
             nodes = np.concatenate([curve.points, curve.points[:1]]) if curve.closed else curve.points
             height = (nodes - self.point) @ normal
             at = np.flatnonzero(height[:-1] * height[1:] < 0)
@@ -223,9 +218,9 @@ def status_words(cut: FieldCut) -> str:
 
 
 def field_cut(
-    fan: RayFan,
+    source: RayFan | Solution,
     *,
-    wavenumber: float,
+    wavenumber: float | None = None,
     boundary: BoundaryLike = "soft",
     point: ArrayLike | None = None,
     across: ArrayLike | None = None,
@@ -235,14 +230,16 @@ def field_cut(
     order: int = 2,
     method: str = "auto",
     polarisation: str | ArrayLike | None = None,
+    incidence: int = 0,
 ) -> FieldCut:
     """Total field on a rectangle of a plane, at the points outside the body: `near_field` or `conductor_field`.
 
     Parameters
     ----------
-    fan : RayFan
-        Long enough to pass where rays leave towards the points.
+    source : RayFan or Solution
+        A fan long enough to pass where rays leave towards the points; or what `solve` returns, of any body.
     wavenumber : float, 1/L
+        For a fan; a solution has its own wavenumber and boundary.
     boundary : "soft", "hard", ImpedanceBoundary or "pec"
     point : (3,), L, optional
         Centre of the rectangle; by default the centre of the body's bounding box.
@@ -255,9 +252,11 @@ def field_cut(
         Grid spacing; by default an eighth of a wavelength. It grows to at most a fifth of a wavelength if `near_field`
         would otherwise find currents too expensive, and further if the grid would exceed 60 000 points.
     order, method
-        As for `near_field`; for a conductor 2, and "auto" or "equation".
+        Of a fan, as for `near_field`; for a conductor 2, and "auto" or "equation".
     polarisation : "theta", "phi" or (3,) complex, optional
         Polarisation of the incident wave, for a conductor; by default "theta".
+    incidence : int
+        Of a solution, the number of the direction of incidence.
 
     Returns
     -------
@@ -281,30 +280,32 @@ def field_cut(
     >>> cut = cr.field_cut(fan, wavenumber=30.0, boundary="pec", extent=(3.0, 2.5), step=0.4, polarisation=(0, 0, 1))
     >>> cut.quantities, cut.magnitude("H").shape, cut.to_xarray()["E"].dims
     (('E', 'H'), (9, 9), ('up', 'across', 'component'))
+    >>> solution = cr.solve(sc.Cylinder(1.0, 2.0), (1, 0, 0), wavenumber=3.0, boundary="hard")
+    >>> cr.field_cut(solution, step=0.5).status_counts["OK"] > 20
+    True
     """
-    k, conductor = _checked(fan, wavenumber, boundary, order, method)
+    given = (wavenumber, boundary, order, method) if isinstance(source, RayFan) else ()
+    grid = cut_grid(source, *given, point=point, across=across, up=up, extent=extent, step=step, incidence=incidence)
+    conductor = (boundary if isinstance(source, RayFan) else source.boundary) == "pec"
     if not conductor and polarisation is not None:
         raise InvalidInputError("polarisation is of a conductor's field; give it with boundary='pec'")
-    grid = cut_grid(
-        fan,
-        wavenumber=k,
-        boundary=boundary,
-        point=point,
-        across=across,
-        up=up,
-        extent=extent,
-        step=step,
-        order=order,
-        method=method,
-    )
+    wave = "theta" if polarisation is None else polarisation
     field: NearField | ConductorField
-    if conductor:
-        wave = "theta" if polarisation is None else polarisation
-        field = conductor_field(fan, grid.points, wavenumber=k, polarisation=wave, method=method)
+    if isinstance(source, Solution):
+        field = (
+            source.conductor_field(grid.points, incidence, wave)
+            if conductor
+            else source.near_field(grid.points, incidence)
+        )
+    elif conductor:
+        field = conductor_field(source, grid.points, wavenumber=grid.wavenumber, polarisation=wave, method=method)
     else:
-        field = near_field(fan, grid.points, wavenumber=k, boundary=boundary, order=order, method=method)
+        field = near_field(
+            source, grid.points, wavenumber=grid.wavenumber, boundary=boundary, order=order, method=method
+        )
+    line = source.line if isinstance(source, RayFan) else None
     parts = {name: getattr(grid, name) for name in ("point", "axes", "across", "up", "outside")}
-    return FieldCut(line=fan.line, field=field, **parts)
+    return FieldCut(body=source.body, direction=grid.direction, line=line, field=field, **parts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -317,6 +318,9 @@ class CutGrid:
         As of `FieldCut`.
     points : (m, 3), L
         Those outside the body, in the order of the grid's rows.
+    direction : (3,)
+        Of the wave.
+    wavenumber : float, 1/L
     """
 
     point: FloatArray
@@ -325,20 +329,23 @@ class CutGrid:
     up: FloatArray
     outside: BoolArray
     points: FloatArray
+    direction: FloatArray
+    wavenumber: float
 
 
 def cut_grid(
-    fan: RayFan,
-    *,
-    wavenumber: float,
+    source: RayFan | Solution,
+    wavenumber: float | None = None,
     boundary: BoundaryLike = "soft",
+    order: int = 2,
+    method: str = "auto",
+    *,
     point: ArrayLike | None = None,
     across: ArrayLike | None = None,
     up: ArrayLike | None = None,
     extent: ArrayLike | None = None,
     step: float | None = None,
-    order: int = 2,
-    method: str = "auto",
+    incidence: int = 0,
 ) -> CutGrid:
     """Points at which `field_cut` would compute the field; arguments, errors as there.
 
@@ -350,32 +357,55 @@ def cut_grid(
     >>> grid.outside.shape, grid.points.shape
     ((7, 7), (40, 3))
     """
-    k, conductor = _checked(fan, wavenumber, boundary, order, method)
-    box = np.asarray(fan.body.bounds, dtype=float)
+    if isinstance(source, Solution):
+        k, weight = source.wavenumber, 0.0
+        if not 0 <= incidence < len(source.directions):
+            raise InvalidInputError(f"incidence = {incidence}: the solution has {len(source.directions)}, from 0")
+        direction = source.directions[incidence]
+    else:
+        one_of(source, "source", RayFan, "creeping.launch, or give what creeping.solve returns")
+        k, weight = _checked(source, wavenumber, boundary, order, method)
+        direction = source.line.direction
+    body = source.body
+    box = np.asarray(body.bounds, dtype=float)
     middle = 0.5 * (box[0] + box[1]) if point is None else real_array(point, "point")
     if middle.shape != (3,) or not np.all(np.isfinite(middle)):
         raise InvalidInputError(f"point has shape {middle.shape}; give three finite coordinates")
-    axes = _axes(fan.line.direction, across, up, box[1] - box[0])
+    axes = _axes(direction, across, up, box[1] - box[0])
     sides = _sides(extent, axes, box)
-    spacing = _spacing(fan, sides, step, k, conductor=conductor, method=method)
-    a, b = (_steps(side, spacing) for side in sides)
+
+    def enough(spacing: float) -> bool:
+        fan = source if isinstance(source, RayFan) and method == "auto" else None
+        return fan is None or affordable(fan, int(weight * _count(sides, spacing)), k)
+
+    a, b = (_steps(side, _spacing(sides, step, k, enough)) for side in sides)
     points = grid_points(middle, axes, a, b)
-    # NaN of a level is deep inside
-    outside = np.asarray(fan.body.level(points.reshape(-1, 3)) >= 0).reshape(points.shape[:2])
+    outside = _outside(body, points.reshape(-1, 3)).reshape(points.shape[:2])
     if not np.any(outside):
         raise InvalidInputError(f"all {outside.size} points are inside the body; give a larger extent")
-    return CutGrid(middle.copy(), axes, a, b, outside, points[outside])
+    return CutGrid(middle.copy(), axes, a, b, outside, points[outside], direction, k)
 
 
-def _checked(fan: RayFan, wavenumber: float, boundary: BoundaryLike, order: int, method: str) -> tuple[float, bool]:
-    """The wavenumber, and whether the body is a conductor."""
-    one_of(fan, "fan", RayFan, "creeping.launch")
+def _outside(body: Surface, points: FloatArray) -> BoolArray:
+    """Whether points (n, 3), L, are outside a body, or on it (n,)."""
+    if hasattr(body, "level"):
+        # NaN of a level is deep inside
+        return np.asarray(body.level(points) >= 0)
+    return ~inside(body, points)
+
+
+def _checked(
+    fan: RayFan, wavenumber: float | None, boundary: BoundaryLike, order: int, method: str
+) -> tuple[float, float]:
+    """The wavenumber, and what a point costs in terms of one of a scalar field."""
     checked_plain(fan.body)
     conductor = isinstance(boundary, str) and boundary == "pec"
+    if wavenumber is None:
+        raise InvalidInputError("the field of a fan needs wavenumber=")
     k = checked(wavenumber, order, fan.body)
     if conductor and (order != 2 or method not in PLAIN):
         raise InvalidInputError("a conductor's field has order 2 and method 'auto' or 'equation'")
-    return k, conductor
+    return k, VECTOR if conductor else 1.0
 
 
 def _axes(direction: FloatArray, across: ArrayLike | None, up: ArrayLike | None, box: FloatArray) -> FloatArray:
@@ -413,8 +443,8 @@ def _count(sides: FloatArray, spacing: float) -> float:
     return float(np.prod(sides / spacing + 1))
 
 
-def _spacing(fan: RayFan, sides: FloatArray, step: float | None, k: float, *, conductor: bool, method: str) -> float:
-    """Spacing of points, L."""
+def _spacing(sides: FloatArray, step: float | None, k: float, enough: Callable[[float], bool]) -> float:
+    """Spacing of points, L, at which currents are not too expensive, if one is: ``enough``."""
     if step is not None:
         given = positive_number(step, "step")
         if _count(sides, given) > MOST:
@@ -426,12 +456,7 @@ def _spacing(fan: RayFan, sides: FloatArray, step: float | None, k: float, *, co
         return number_between(given, "step", 0.0, float(np.min(sides)))
     wavelength = 2 * np.pi / k
     spacing = wavelength / FINE
-    weight = VECTOR if conductor else 1.0
-    while (
-        method == "auto"
-        and spacing < wavelength / COARSE
-        and not affordable(fan, int(weight * _count(sides, spacing)), k)
-    ):
+    while spacing < wavelength / COARSE and not enough(spacing):
         spacing = min(1.1 * spacing, wavelength / COARSE)
     if _count(sides, spacing) > ENOUGH:
         spacing = float(np.sqrt(np.prod(sides) / ENOUGH)) * 1.01

@@ -17,6 +17,7 @@ from creeping.errors import InvalidInputError
 from creeping.field.comparison import decibels, shown_range
 from creeping.field.cut_result import FieldCut, grid_points, status_words
 from creeping.field.point_result import FieldStatus
+from creeping.geometry.parts import inside, why_no_rays
 from creeping.plotting.coloured_body import NOTHING
 from creeping.plotting.coupling_pictures import LEAST_SAMPLES, at_phase
 from creeping.plotting.palette import add_bar, beyond
@@ -290,12 +291,12 @@ def dress(cut: FieldCut, ax: Any) -> None:
     share = max(1, int(np.ceil(OUTLINE / max(cut.outside.shape))))
     across, up = (np.linspace(one[0], one[-1], share * (len(one) - 1) + 1) for one in (cut.across, cut.up))
     points = grid_points(cut.point, cut.axes, across, up)
-    level = np.nan_to_num(cut.body.level(points.reshape(-1, 3)).reshape(points.shape[:2]), nan=-1.0)
+    level = _level(cut.body, points.reshape(-1, 3)).reshape(points.shape[:2])
     if level.min() < 0 < level.max():
         ax.contourf(across, up, level, [level.min() - 1.0, 0.0], colors=SECTION, zorder=2)
         ax.contour(across, up, level, [0.0], colors="#111111", linewidths=0.8, zorder=2.1)
     ax.plot(*cut.shadow_points().T, "o", color="#111111", markeredgecolor="#ffffff", markersize=5, zorder=3)
-    along = cut.axes @ cut.line.direction
+    along = cut.axes @ cut.direction
     if np.hypot(*along) > 0.2:
         middle = np.array([0.14, 0.9])
         box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
@@ -314,6 +315,13 @@ def dress(cut: FieldCut, ax: Any) -> None:
     ax.tick_params(labelsize=8, width=0.5)
 
 
+def _level(body: Any, points: FloatArray) -> FloatArray:
+    """F of a body, or of one without F 0.5 outside and -0.5 inside (n,)."""
+    if why_no_rays(body):
+        return np.where(inside(body, points), -0.5, 0.5)
+    return np.asarray(np.nan_to_num(body.level(points), nan=-1.0))
+
+
 def _axis(cut: FieldCut, number: int) -> str:
     axis, unit = cut.axes[number], cut.field.length_unit
     place = int(np.argmax(np.abs(axis)))
@@ -321,7 +329,7 @@ def _axis(cut: FieldCut, number: int) -> str:
         offset = cut.point[place]
         name = f"{'-' if axis[place] < 0 else ''}{'xyz'[place]}"
         return f"{name} ({unit})" if abs(offset) < 1e-9 else f"{name} from {'xyz'[place]} = {offset:.4g} ({unit})"
-    if abs(axis @ cut.line.direction) > 1 - 1e-9:
+    if abs(axis @ cut.direction) > 1 - 1e-9:
         return f"along d ({unit})"
     return f"along ({', '.join(f'{v:.3g}' for v in axis + 0.0)}) ({unit})"
 

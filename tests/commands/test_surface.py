@@ -64,11 +64,14 @@ def test_a_run_of_facets(two_balls, tmp_path, capsys):
     out = tmp_path / "run"
     code, said, _ = creeping(
         "run", *words, "--direction", 1, 0.2, 0.1, "--wavenumber", 4, "--boundary", "hard", "--observe", "backscatter",
-        "-o", out, capsys=capsys,
+        "--plane", "xy:0.25", "-o", out, capsys=capsys,
     )  # fmt: skip
-    assert code == 0 and "no creeping rays: no smooth surface fits it" in said
+    assert code == 0 and "no creeping rays: no smooth surface fits it" in said and "field on the plane xy:0.25" in said
     summary = json.loads((out / "summary.json").read_text())
-    assert summary["files"] == ["far.csv", "summary.json"] and summary["field"]["unresolved"] == 0
+    assert summary["files"] == ["far.csv", "plane.csv", "summary.json"] and summary["field"]["unresolved"] == 0
+    (plane,) = summary["planes"]
+    assert plane["methods"] == {"equation": len(table(out / "plane.csv"))}
+    assert len(table(out / "plane.csv")) + plane["inside"] == np.prod(plane["points"])
     row = table(out / "far.csv")[0]
     assert row["method"] == "equation" and "lit_re" in row and "creeping_re" not in row
     code, _, said = creeping("run", *words, "--direction", 1, 0, 0, "-o", out, capsys=capsys)
@@ -84,7 +87,8 @@ def test_echoes_of_facets(two_balls, tmp_path):
 def test_a_study_of_facets(two_balls, tmp_path, capsys):
     study = tmp_path / "a.toml"
     study.write_text(
-        f'[study]\nbody = "{two_balls.name}"\nunits = "m"\nwavenumbers_per_length = [3.0]\nboundary = ["hard"]\n'
+        f'[study]\nbody = "{two_balls.name}"\nunits = "m"\nsurface = "facets"\n'
+        'wavenumbers_per_length = [3.0]\nboundary = ["hard"]\n'
         '[incidences]\nkind = "lebedev"\norder = 3\n[run]\noutput = "out.zarr"\n'
     )
     code, out, _ = creeping("sweep", study, capsys=capsys)

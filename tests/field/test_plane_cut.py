@@ -5,6 +5,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
+from creeping.errors import InvalidInputError
 from tests.reference import sphere
 
 K = 10.0
@@ -114,3 +115,20 @@ def test_unknown_quantity_and_lengths_are_refused(cut):
         cut.wave("E")
     with pytest.raises(cr.InvalidInputError, match="3 values for"):
         cut.on_grid([1, 2, 3])
+
+
+def test_a_solution_of_any_body_has_its_plane():
+    """Of two bodies without F: the points and values of its near field."""
+    two = sc.Bodies([sc.Sphere(), sc.Sphere(0.5)], at=[(0, 0, 0), (0, 2, 0)])
+    solution = cr.solve(two, [(1, 0, 0), (0, 1, 0)], wavenumber=3.0, boundary="hard")
+    found = cr.field_cut(solution, incidence=1, extent=(4.0, 3.0), step=0.5, point=(0, 1, 0), up=(1, 0, 0))
+    assert found.line is None and found.shadow_points().shape == (0, 2) and np.all(found.direction == (0, 1, 0))
+    apart = [np.linalg.norm(found.points - centre, axis=-1) for centre in ((0, 0, 0), (0, 2, 0))]
+    np.testing.assert_array_equal(found.outside, (apart[0] >= 1) & (apart[1] >= 0.5))
+    at = found.points[found.outside]
+    np.testing.assert_array_equal(found.field.values, solution.near_field(at, incidence=1).values)
+    assert found.plot() is not None
+    with pytest.raises(InvalidInputError, match="incidence = 2: the solution has 2"):
+        cr.field_cut(solution, incidence=2)
+    with pytest.raises(InvalidInputError, match=r"or give what creeping\.solve returns"):
+        cr.field_cut(two, wavenumber=3.0)

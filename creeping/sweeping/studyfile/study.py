@@ -60,6 +60,7 @@ STUDY = {
     "union": Key("flag", False),
     "subdivide": Key("text"),
     "sew": Key("positive"),
+    "surface": Key("text", choices=("smooth", "facets", "auto")),
     "quantity": Key("text", "monostatic", choices=QUANTITIES),
     "boundary": Key("texts"),
     "wavenumbers_per_length": Key("wavenumbers", ()),
@@ -217,7 +218,7 @@ def parse_study(text: str, *, folder: Path, name: str = "the study") -> Study:
         count = "1 mistake" if len(mistakes) == 1 else f"{len(mistakes)} mistakes"
         raise InvalidInputError(f"{name} has {count}:\n  " + "\n  ".join(mistakes), mistakes=mistakes)
     kept = {key: main[key] for key in ("name", "body", "units", "speed")}
-    file = {key: main[key] for key in ("strict", "part", "cap", "union", "subdivide", "sew")}
+    file = {key: main[key] for key in ("strict", "part", "cap", "union", "subdivide", "sew", "surface")}
     incidences = sets["incidences"]
     assert incidences is not None
     return Study(
