@@ -176,6 +176,17 @@ class Coupling(ArrayResult, Drawn):
         return np.asarray(self.status == FieldStatus.OK)
 
     @property
+    def db(self) -> FloatArray:
+        """20 log10 of the values' size (n, n), dB re 1 `unit`; inf on the diagonal."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(20 * np.log10(np.abs(self.values)))
+
+    @property
+    def unit(self) -> str:
+        """Unit of the values: "1/L" for points, "1/L^2" for slots and monopoles, with the body's unit of length."""
+        return self._kind[0]
+
+    @property
     def status_counts(self) -> dict[str, int]:
         """Number of entries by name of status; only statuses that occur."""
         return {s.name: int(np.sum(self.status == s)) for s in FieldStatus if np.any(self.status == s)}
