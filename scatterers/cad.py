@@ -60,8 +60,8 @@ class Cad(FittedBody):
         True stores the fit in the cache folder of the user, a path in that folder; False does not store it.
     speed : str or object with ``value`` and ``gradient``, optional
         Speed c(x) of the weighted flow.
-    progress : callable, optional
-        Called with a line of text before each long step.
+    progress : callable or bool, optional
+        Called with a line of text before each long step; True shows them.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class Cad(FittedBody):
         surface: str = "smooth",
         cache: bool | str | Path = True,
         speed: Any = None,
-        progress: Callable[[str], None] | None = None,
+        progress: Callable[[str], None] | bool | None = None,
     ) -> None:
         if surface == "auto":
             # made already

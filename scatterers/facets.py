@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.cad_file.files import SUFFIXES, CadReading, cad_triangles
-from scatterers.shown import Shown
+from scatterers.shown import Shown, teller
 from scatterers.triangles.files import read_mesh
 from scatterers.triangles.quality import Choice
 
@@ -49,8 +49,8 @@ class Facets(Shown):
         Largest hole to close, m; inf closes all.
     union : bool
         Take the outer surface of all parts together; parts may cross each other. Needs the library manifold3d.
-    progress : callable, optional
-        Called with a line of text for each repair.
+    progress : callable or bool, optional
+        Called with a line of text for each repair; True shows them.
 
     Attributes
     ----------
@@ -90,10 +90,10 @@ class Facets(Shown):
         part: str | int | None = None,
         cap: float | None = None,
         union: bool = False,
-        progress: Callable[[str], None] | None = None,
+        progress: Callable[[str], None] | bool | None = None,
     ) -> None:
         in_memory = hasattr(source, "vertices") and hasattr(source, "faces")
-        choice, tell = Choice(part, cap, union, every=True), progress or (lambda _: None)
+        choice, tell = Choice(part, cap, union, every=True), teller(progress)
         self.tessellated = not in_memory and Path(str(source)).suffix.lower() in SUFFIXES
         if self.tessellated:
             mesh = cad_triangles(Path(source), CadReading(units, POINTS, choice), progress=tell)

@@ -1,5 +1,7 @@
 """How bodies show themselves in notebooks: a short table of what they are and how large."""
 
+import sys
+from collections.abc import Callable
 from html import escape
 from typing import Any
 
@@ -27,3 +29,26 @@ class Shown:
             rows["rays"] = f"none: {body.without_rays}"
         cells = "".join(f"<tr><th>{name}</th><td>{escape(value)}</td></tr>" for name, value in rows.items())
         return f"<table><caption>{type(body).__name__}</caption><tbody>{cells}</tbody></table>"
+
+
+def teller(progress: Any) -> Callable[[str], None]:
+    """What is called with each line of progress: a function that was given, for True one that shows it.
+
+    Raises
+    ------
+    TypeError
+        If it is neither.
+    """
+    if progress is True:
+        return _show
+    if progress is not None and progress is not False and not callable(progress):
+        raise TypeError(f"progress = {progress!r} cannot be called; give True or a function of one text")
+    return progress or _ignore
+
+
+def _show(text: str) -> None:
+    print(f"scatterers: {text}", file=sys.stderr)
+
+
+def _ignore(text: str) -> None:
+    pass

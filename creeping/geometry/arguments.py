@@ -5,6 +5,7 @@ numpy makes numbers of texts, dates and masked arrays without a word, and drops 
 
 import os
 import reprlib
+import sys
 from collections.abc import Callable, Sized
 from pathlib import Path
 
@@ -175,22 +176,28 @@ def folder_path(value: Any, name: str) -> Path:
 
 
 def reporter(progress: Any) -> Progress:
-    """The callable that is told what is done; one that does nothing for None.
+    """The callable that is told what is done: one that shows it for True, and that does nothing for None.
 
     Raises
     ------
     InvalidInputError
         If it cannot be called.
     """
-    if progress is None:
+    if progress is None or progress is False:
         return _nothing
+    if progress is True:
+        return _show
     if not callable(progress):
-        raise InvalidInputError(f"progress = {shown(progress)} cannot be called; give a function of a text")
+        raise InvalidInputError(f"progress = {shown(progress)} cannot be called; give True or a function of a text")
     return progress  # type: ignore[no-any-return]
 
 
 def _nothing(_: str) -> None:
     pass
+
+
+def _show(text: str) -> None:
+    print(f"creeping: {text}", file=sys.stderr)
 
 
 def one_of(value: Any, name: str, kind: type, made_by: str) -> None:

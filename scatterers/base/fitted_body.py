@@ -13,6 +13,7 @@ from scatterers.base.two_fits import good_fit, require_one_body
 from scatterers.pieces.fitting import fitted_pieces
 from scatterers.pieces.patch import Crease
 from scatterers.pieces.spline_body import SplinePiece, SplinePieces
+from scatterers.shown import teller
 from scatterers.sphere_map.star import star_map
 from scatterers.spline import cache as _fit_cache
 from scatterers.spline.cloud import FitReport, Samples
@@ -257,9 +258,7 @@ def checked_options(units: Any, strict: Any, cache: Any, progress: Any) -> Progr
         raise ValueError(f"strict = {strict!r} is neither True nor False")
     if not isinstance(cache, (bool, str, Path)):
         raise ValueError(f"cache = {cache!r} is neither True, False nor a folder")
-    if progress is not None and not callable(progress):
-        raise TypeError(f"progress = {progress!r} cannot be called; give a function of one text")
-    return progress or (lambda _: None)
+    return teller(progress)
 
 
 def _fitted_pieces(cloud: PieceCloud, progress: Progress) -> tuple[dict[str, FloatArray], dict[str, Any]]:

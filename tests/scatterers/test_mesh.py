@@ -302,6 +302,13 @@ def test_what_is_no_smooth_body_is_refused_as_strict(name, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_progress_may_be_shown(capsys):
+    sc.Facets(trimesh.creation.box(), progress=True)
+    sc.Mesh(trimesh.creation.icosphere(subdivisions=2), progress=True, cache=False)
+    said = capsys.readouterr().err
+    assert "scatterers: reading the mesh" in said
+
+
 @pytest.mark.parametrize(
     "options, error, match",
     [

@@ -53,7 +53,7 @@ def choose_flow(
     n_steps: int = 1,
     carry_jacobi: bool = True,
     cache: bool | str | Path = True,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> PhaseMap | DirectFlow:
     """Choose the flow that traces the rays fastest, including the time to prepare a map.
 
@@ -71,8 +71,8 @@ def choose_flow(
         Whether the flow must carry the Jacobi matrix, which fans need.
     cache : bool or path
         As for `build_phase_map`. A cached map counts as free.
-    progress : callable, optional
-        Called with a line of text before each long step, and with the reason for the choice.
+    progress : callable or bool, optional
+        Called with a line of text before each long step and with the reason for the choice; True shows them.
 
     Returns
     -------

@@ -44,7 +44,7 @@ def build_phase_map(
     time_step: float | None = None,
     stages: int | None = None,
     cache: bool | str | Path = True,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> PhaseMap:
     """Build the phase map g_T0 of a body, or open it from the cache.
 
@@ -81,8 +81,8 @@ def build_phase_map(
         S, the number of levels of the tower.
     cache : bool or path
         True uses the cache folder of the user, a path another folder; False disables the cache.
-    progress : callable, optional
-        Called with a line of text before each long step.
+    progress : callable or bool, optional
+        Called with a line of text before each long step; True shows them.
 
     Returns
     -------
