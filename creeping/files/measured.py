@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from io import TextIOWrapper
 from pathlib import Path
-from typing import TextIO
 
 import numpy as np
 
@@ -86,11 +85,7 @@ def read_cut(path: str | os.PathLike[str]) -> MeasuredCut:
         If it is no such table, with the columns that were found; or if it is too large, with the number of the line.
     """
     file = Path(path)
-    try:
-        with TextIOWrapper(opened(file, MOST_BYTES), encoding="utf-8-sig", errors="replace") as stream:
-            header, numbers = _table(file, stream)
-    except OSError as error:
-        raise InvalidInputError(f"cannot read {file}: {error.strerror or error}") from error
+    header, numbers = _table(file)
     names = header or ["angle", *(f"level {i}" for i in range(1, numbers.shape[1]))]
     at, over, scale = _abscissa(file, names, numbers)
     levels = {}
@@ -111,12 +106,12 @@ def read_cut(path: str | os.PathLike[str]) -> MeasuredCut:
     return MeasuredCut(file.name, over, scale * numbers[order, at], found, polar)
 
 
-def _table(file: Path, stream: TextIO) -> tuple[list[str], FloatArray]:
+def _table(file: Path) -> tuple[list[str], FloatArray]:
     """Header, empty if there is none, and numbers by row and column, NaN for what is none."""
     headers: list[list[str]] = []
     # a list of lists would take ten times the memory
     numbers, rows, columns, bare = array("d"), 0, 0, False
-    for number, line in _lines(file, stream):
+    for number, line in lines_of(file, MOST_BYTES, LONGEST):
         comment = line.startswith(COMMENT)
         cells = _cells(line.lstrip("#%!/ ") if comment else line)
         values = [_number(cell) for cell in cells]
@@ -147,13 +142,25 @@ def _table(file: Path, stream: TextIO) -> tuple[list[str], FloatArray]:
     return header, np.array(numbers).reshape(rows, columns)
 
 
-def _lines(file: Path, stream: TextIO) -> Iterator[tuple[int, str]]:
-    """Lines that are not empty, with their numbers; of one without an end no more is read than is needed to refuse."""
-    for number, raw in enumerate(iter(lambda: stream.readline(LONGEST + 2), ""), 1):
-        if len(raw) > LONGEST + 1:
-            raise InvalidInputError(f"{file}, line {number}: more than {LONGEST} characters")
-        if line := raw.strip():
-            yield number, line
+def lines_of(file: Path, most_bytes: int, longest: int) -> Iterator[tuple[int, str]]:
+    """Lines of a text file that are not empty, with their numbers.
+
+    Of a line without an end no more is read than is needed to refuse it.
+
+    Raises
+    ------
+    InvalidInputError
+        If it cannot be read, or a line is too long.
+    """
+    try:
+        with TextIOWrapper(opened(file, most_bytes), encoding="utf-8-sig", errors="replace") as stream:
+            for number, raw in enumerate(iter(lambda: stream.readline(longest + 2), ""), 1):
+                if len(raw) > longest + 1:
+                    raise InvalidInputError(f"{file}, line {number}: more than {longest} characters")
+                if line := raw.strip():
+                    yield number, line
+    except OSError as error:
+        raise InvalidInputError(f"cannot read {file}: {error.strerror or error}") from error
 
 
 def _listed(names: list[str]) -> str:
