@@ -29,7 +29,7 @@ from creeping.geometry.surface import Surface, size
 from creeping.geometry.triangulation import Triangulation
 from creeping.plotting._drawing import shadow_view
 from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, RAY_COLOUR, STATUS_COLOURS, line_pieces
-from creeping.plotting.coupling_pictures import LEAST_SAMPLES, samples_a_wave
+from creeping.plotting.coloured_body import LEAST_SAMPLES, samples_a_wave
 
 CELLS = 44
 """Of the drawn body along each side of its box."""

@@ -18,8 +18,8 @@ from creeping.field.comparison import shown_range
 from creeping.field.far_result import FarField
 from creeping.plotting._strokes import RAY_COLOUR, STATUS_COLOURS, line_pieces
 from creeping.plotting.far_cuts import component_name
-from creeping.plotting.palette import COLOURS, EXACT
-from creeping.plotting.parameter_plane import is_torus
+from creeping.plotting.line_plots import is_torus
+from creeping.plotting.pages import COLOURS, EXACT
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import split_at_seam
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from creeping._typing import ComplexArray, FloatArray
-from creeping.plotting.coupling_pictures import LEAST_SAMPLES, at_phase
+from creeping.plotting.coloured_body import LEAST_SAMPLES, at_phase
 from creeping.rays.fan import RayFan
 
 Bytes = NDArray[np.uint8]

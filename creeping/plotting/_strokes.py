@@ -7,6 +7,7 @@ weak, and covers the picture.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import TypedDict
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from creeping.field.creeping_modes import fock_scale, slowest_decay
 from creeping.geometry.checks import UNKNOWN
 from creeping.geometry.evaluators import speed_of
 from creeping.geometry.surface import size
+from creeping.plotting.pages import add_bar
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.rays.reach import IN_RANGE
@@ -37,6 +39,25 @@ passes at most."""
 PALER = (1.0, 0.6, 0.35)
 """Opacity of rays between these."""
 LEVEL_NAMES = {"travel_time": "travel time", "eikonal": "eikonal"}
+
+
+class RayOptions(TypedDict, total=False):
+    """Options of all pictures of rays; see `picture`."""
+
+    rays: int
+    until: float | None
+    wavenumber: float | None
+    boundary: BoundaryLike
+
+
+@dataclass(frozen=True)
+class RayLook:
+    """What `RayOptions` are by default."""
+
+    rays: int = 48
+    until: float | None = None
+    wavenumber: float | None = None
+    boundary: BoundaryLike = "hard"
 
 
 @dataclass(frozen=True)
@@ -319,8 +340,5 @@ class LevelColours:
     def add_bar(self, figure: Any, **place: Any) -> None:
         """Colour bar, where there are two levels at least; ``place`` as for ``Figure.colorbar``."""
         if self.high > self.low:
-            bar = figure.colorbar(self.mappable, **place)
             unit = f" ({self.unit})" * (self.unit != UNKNOWN)
-            bar.set_label(f"iso-phase curves: {self.name}{unit}", fontsize=8)
-            bar.ax.tick_params(labelsize=8, width=0.5)
-            bar.outline.set_linewidth(0.5)
+            add_bar(figure, self.mappable, f"iso-phase curves: {self.name}{unit}", fontsize=8, **place)

@@ -5,13 +5,13 @@ the hidden part faintly; that holds for the view it was drawn for, not after tur
 """
 
 from collections.abc import Sequence
+from typing import Unpack
 
 import numpy as np
 
 from creeping._typing import Any, FloatArray
-from creeping.field.boundary import BoundaryLike
 from creeping.plotting._drawing import Drawing, View, compose
-from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, Stroke, runs
+from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, RayOptions, Stroke, runs
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowLine
@@ -24,11 +24,8 @@ def plot_rays_3d(
     *,
     ax: Any = None,
     view: View | None = None,
-    rays: int = 48,
-    until: float | None = None,
-    wavenumber: float | None = None,
-    boundary: BoundaryLike = "hard",
     legend: bool = True,
+    **shown: Unpack[RayOptions],
 ) -> Any:
     """Draw the body, its shadow line, creeping rays and iso-phase curves on matplotlib axes.
 
@@ -61,7 +58,6 @@ def plot_rays_3d(
         from matplotlib import pyplot
 
         ax = pyplot.figure(figsize=(6.4, 5.2), dpi=150).add_subplot(projection="3d")
-    shown: dict[str, Any] = {"rays": rays, "until": until, "wavenumber": wavenumber, "boundary": boundary}
     drawing = compose(line, fan, curves, view=view, **shown)
     draw(ax, drawing)
     if legend:

@@ -2,19 +2,19 @@
 
 import os
 from collections.abc import Sequence
+from typing import Unpack
 
 import numpy as np
 
 from creeping._typing import Any
 from creeping.errors import InvalidInputError
-from creeping.field.boundary import BoundaryLike
-from creeping.plotting._drawing import Drawing, View, compose, rays_caption
-from creeping.plotting._strokes import ARROW_COLOUR
+from creeping.plotting._drawing import Drawing, View, compose
+from creeping.plotting._strokes import ARROW_COLOUR, RayOptions
+from creeping.plotting.pages import new_figure, save_figure
 from creeping.plotting.scene import gl_available
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowLine
-from creeping.storage.atomic import written_aside
 
 BACKENDS = ("auto", "pyvista", "matplotlib")
 WIDTH = 6.4  # inches
@@ -33,12 +33,9 @@ def picture(
     *,
     backend: str = "auto",
     view: View | None = None,
-    rays: int = 48,
-    until: float | None = None,
-    wavenumber: float | None = None,
-    boundary: BoundaryLike = "hard",
     name: str = "",
     dpi: int = 300,
+    **shown: Unpack[RayOptions],
 ) -> str:
     """Write a PNG of the body with its shadow line, creeping rays and iso-phase curves.
 
@@ -80,7 +77,6 @@ def picture(
         If pyvista is asked for and cannot draw here, or the file cannot be written.
     """
     backend = chosen_backend(backend)
-    shown: dict[str, Any] = {"rays": rays, "until": until, "wavenumber": wavenumber, "boundary": boundary}
     drawing = compose(line, fan, curves, view=view, name=name, **shown)
     figure, bar = drawn_page(drawing, backend, dpi)
     drawing.add_legend(figure)
@@ -88,37 +84,6 @@ def picture(
         drawing.colours.add_bar(figure, cax=figure.add_axes(bar))
     save_figure(figure, path, dpi)
     return backend
-
-
-def parameter_picture(
-    path: str | os.PathLike[str],
-    line: ShadowLine,
-    fan: RayFan | None = None,
-    curves: Sequence[IsoPhaseCurve] = (),
-    *,
-    rays: int = 48,
-    until: float | None = None,
-    wavenumber: float | None = None,
-    boundary: BoundaryLike = "hard",
-    name: str = "",
-    dpi: int = 300,
-) -> None:
-    """Write a PNG of the same in the plane of the body's parameters; see `plot_parameters`.
-
-    Raises
-    ------
-    CreepingError
-        If the file cannot be written.
-    """
-    from creeping.plotting.parameter_plane import is_torus, page_size, plot_parameters
-
-    figure = new_figure(page_size(torus=is_torus(line)))
-    figure.set_layout_engine("constrained")
-    shown: dict[str, Any] = {"rays": rays, "until": until, "wavenumber": wavenumber, "boundary": boundary}
-    ax = plot_parameters(line, fan, curves, ax=figure.add_subplot(), **shown)
-    title = rays_caption(line, fan, until, wavenumber, boundary, name)
-    ax.set_title(title, fontsize=TITLE_SIZE, loc="left", parse_math=False)
-    save_figure(figure, path, dpi)
 
 
 def chosen_backend(backend: str) -> str:
@@ -144,48 +109,6 @@ def drawn_page(drawing: Drawing, backend: str, dpi: int) -> tuple[Any, Place]:
     figure.text(0.02, 0.99, drawing.title, fontsize=TITLE_SIZE, va="top", parse_math=False)
     left, bottom, width, height = place
     return figure, (left + width + 0.02, bottom + 0.12 * height, 0.022, 0.76 * height)
-
-
-def new_figure(inches: tuple[float, float]) -> Any:
-    """Return a figure outside pyplot: no window, no global state, whatever the user's backend; notebooks show it."""
-    from creeping.plotting._inline import made
-
-    return made(inches)
-
-
-def axes_or_new(ax: Any, inches: tuple[float, float], *, space: bool = False) -> tuple[bool, Any]:
-    """Whether the axes are new, and the axes: those given, or those of a new figure, of the plane or of space."""
-    if ax is not None:
-        return False, ax
-    from creeping.plotting._inline import InlineAxes, InlineAxes3D
-
-    figure = new_figure(inches)
-    figure.set_layout_engine("constrained")
-    return True, figure.add_subplot(axes_class=InlineAxes3D if space else InlineAxes)
-
-
-def add_legend(ax: Any, fresh: bool, legend: bool | None = None) -> None:
-    """Legend below a new figure, or on axes that were given if it is asked for; what was drawn last comes first."""
-    handles, labels = ax.get_legend_handles_labels()
-    if not (fresh if legend is None else legend) or not labels:
-        return
-    look: dict[str, Any] = {"frameon": False, "fontsize": 8}
-    if fresh:
-        columns = min(4 if max(map(len, labels)) < 20 else 3, len(labels))
-        ax.figure.legend(handles[::-1], labels[::-1], loc="outside lower center", ncols=columns, **look)
-    else:
-        ax.legend(handles[::-1], labels[::-1], **look)
-
-
-def wave_title(field: Any, unit: str) -> str:
-    """Wavenumber and boundary of a field, lengths in ``unit``: a title that is no formula, boundaries being users'."""
-    return f"k = {field.wavenumber:g}/{unit}, {field.boundary}"
-
-
-def save_figure(figure: Any, path: str | os.PathLike[str], dpi: int) -> None:
-    """Write the figure as PNG, at once when complete."""
-    with written_aside(path) as aside:
-        figure.savefig(aside, dpi=dpi, format="png")
 
 
 def _page(drawing: Drawing) -> tuple[Any, Place]:

@@ -18,15 +18,15 @@ from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from creeping._typing import Any, FloatArray
 from creeping.errors import CreepingError
-from creeping.field.boundary import BoundaryLike
 from creeping.plotting._drawing import Drawing, View, compose
-from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, Stroke
+from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, RayOptions, Stroke
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowLine
@@ -56,11 +56,8 @@ def plot_rays_3d(
     *,
     plotter: Any = None,
     view: View | None = None,
-    rays: int = 48,
-    until: float | None = None,
-    wavenumber: float | None = None,
-    boundary: BoundaryLike = "hard",
     legend: bool = True,
+    **shown: Unpack[RayOptions],
 ) -> Any:
     """Draw the body, its shadow line, creeping rays and iso-phase curves with pyvista.
 
@@ -97,7 +94,6 @@ def plot_rays_3d(
     require_gl()
     import pyvista
 
-    shown: dict[str, Any] = {"rays": rays, "until": until, "wavenumber": wavenumber, "boundary": boundary}
     drawing = compose(line, fan, curves, view=view, **shown)
     if plotter is None:
         plotter = pyvista.Plotter(window_size=(1200, 1000))

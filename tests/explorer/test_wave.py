@@ -13,7 +13,7 @@ from creeping.explorer.request import ViewRequest
 from creeping.explorer.text import legend, wave_note
 from creeping.explorer.wave import ENDED, WAVE_COLOURS, strengths, wave_colours
 from creeping.geometry.triangulation import triangulate
-from creeping.plotting.coupling_pictures import at_phase
+from creeping.plotting.coloured_body import at_phase
 from tests.patience import until
 from tests.reference import sphere
 
