@@ -7,33 +7,31 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from creeping.commands.body import AS_IT_IS, CAD, MESHES, Body, FileOptions, SpeedOption, is_file, parse_body
+from creeping.commands import options
+from creeping.commands.body import CAD, MESHES, is_file, parse_body
 
-WAVELENGTHS = 6.0
-"""Size of a body for which it is told how its field is made, where no wavenumber is given."""
-Json = Annotated[bool, Parameter(name="--json", negative="", help="Print as JSON.")]
 Wavenumber = Annotated[
-    float | None, Parameter(help="k, 1/L: whether the field's expansions reach there; a file's size in wavelengths.")
+    float | None,
+    Parameter(
+        group=options.FIELD, help="k, 1/L: whether the field's expansions reach there; a file's size in wavelengths."
+    ),
 ]
-Frequency = Annotated[str | None, Parameter(help='Instead of k, e.g. "10GHz": lengths are metres then.')]
-Wavelength = Annotated[str | None, Parameter(help='Instead of k, e.g. "3cm".')]
-SoundSpeed = Annotated[float | None, Parameter(help="With a frequency: of the medium, m/s; light if not given.")]
 Output = Annotated[
     Path | None, Parameter(name=["-o", "--output"], help="Folder for quality.png, a file's mesh where it is rough.")
 ]
 
 
 def check(
-    body: Body,
+    body: options.Body,
     *,
-    speed: SpeedOption = None,
-    file: FileOptions = AS_IT_IS,
+    speed: options.SpeedOption = None,
+    file: options.FileOptions = options.AS_IT_IS,
     wavenumber: Wavenumber = None,
-    frequency: Frequency = None,
-    wavelength: Wavelength = None,
-    sound_speed: SoundSpeed = None,
+    frequency: options.Frequency = None,
+    wavelength: options.Wavelength = None,
+    sound_speed: options.SoundSpeed = None,
     output: Output = None,
-    json_: Json = False,
+    json_: options.Json = False,
 ) -> int:
     """Verify a body: derivatives, closedness, orientation, cover and overlap of its charts; of a file its quality too.
 
@@ -87,7 +85,8 @@ def _field(
     from creeping.commands.forecast import forecast
     from creeping.field.arguments import wavelengths_across
 
-    k = wavenumber or WAVELENGTHS / wavelengths_across(shape, 1.0)
+    # of a body six wavelengths across where no wavenumber is given
+    k = wavenumber or 6.0 / wavelengths_across(shape, 1.0)
     told = forecast(shape, k, "hard", **asked)
     answer["field"] = {"body": told.body, "wavenumber": k, "nodes": told.nodes, "by": told.by}
     texts[:0] = [told.body, f"far field, rigid, at k = {k:.4g}: {told.by}"]
@@ -147,7 +146,7 @@ def _range(shape: Any, wavenumber: float, answer: dict[str, Any], texts: list[st
 
 def _mesh(
     body: str,
-    file: FileOptions,
+    file: options.FileOptions,
     wavenumber: float | None,
     output: Path | None,
     answer: dict[str, Any],

@@ -153,15 +153,11 @@ def write_results(
     formats: tuple[str, ...] = ("csv",),
 ) -> tuple[list[str], dict[str, Any]]:
     """Write tables and pictures; their names, and what they add to the summary."""
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InvalidInputError(f"cannot make the folder {output}: {error}; choose another with -o") from error
     stem = echo.quantity
-    writers: dict[str, Callable[[Path, Echo], None]] = {"csv": write_echo, "mat": write_mat}
     names = [f"{stem}.{kind}" for kind in formats]
-    for kind in formats:
-        writers[kind](output / f"{stem}.{kind}", echo)
+    for file in names:
+        write = write_mat if file.endswith(".mat") else write_echo
+        write(output / file, echo)
     extra: dict[str, Any] = {"wrong_signs": wrong_signs(body)[0]} if is_piecewise(body) else {}
     for channel, found in comparisons.items():
         extra.setdefault("compared", {})[channel] = found.summary()

@@ -15,11 +15,10 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
-
-from cyclopts import Parameter
+from typing import Any
 
 from creeping._version import __version__
+from creeping.commands import options
 
 LIBRARIES = ("numpy", "scipy", "numba", "matplotlib", "pyvista", "vtk", "trimesh")
 OPTIONAL = {
@@ -30,7 +29,6 @@ OPTIONAL = {
     "dask": "sweeps on clusters",
     "viser": "creeping explore",
 }
-Json = Annotated[bool, Parameter(name="--json", negative="", help="Print as JSON.")]
 
 
 def versions() -> dict[str, str | None]:
@@ -66,7 +64,7 @@ def _sources() -> dict[str, str]:
     return {stem: str(found[1]["source"]) for stem, found in kept if found and found[1].get("source")}
 
 
-def list_maps(*, json_: Json = False) -> int:
+def list_maps(*, json_: options.Json = False) -> int:
     """List the stored maps and fitted bodies."""
     from creeping.errors import CreepingError
     from creeping.phaseflow import cache as caching
