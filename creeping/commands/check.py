@@ -78,28 +78,21 @@ def check(
     return 0 if ok else 3
 
 
-def _field(
-    shape: Any, wavenumber: float | None, answer: dict[str, Any], texts: list[str], asked: dict[str, Any]
-) -> None:
-    """What a field of the body is made by, what that takes, and about which error it has."""
-    from creeping.commands.forecast import forecast
-    from creeping.field.arguments import wavelengths_across
-
-    # of a body six wavelengths across where no wavenumber is given
-    k = wavenumber or 6.0 / wavelengths_across(shape, 1.0)
-    told = forecast(shape, k, "hard", **asked)
-    answer["field"] = {"body": told.body, "wavenumber": k, "nodes": told.nodes, "by": told.by}
-    texts[:0] = [told.body, f"far field, rigid, at k = {k:.4g}: {told.by}"]
-
-
 def _surface(
     shape: Any, wavenumber: float | None, answer: dict[str, Any], texts: list[str], asked: dict[str, Any]
 ) -> bool:
+    """Whether nothing is wrong with a surface; adds how its field is made, its checks, its fit and its range."""
     from creeping import check_surface
+    from creeping.commands.forecast import forecast
+    from creeping.field.arguments import wavelengths_across
     from creeping.geometry.parts import why_no_rays
 
     if getattr(shape, "speed", None) is None:
-        _field(shape, wavenumber, answer, texts, asked)
+        # of a body six wavelengths across where no wavenumber is given
+        k = wavenumber or 6.0 / wavelengths_across(shape, 1.0)
+        told = forecast(shape, k, "hard", **asked)
+        answer["field"] = {"body": told.body, "wavenumber": k, "nodes": told.nodes, "by": told.by}
+        texts[:0] = [told.body, f"far field, rigid, at k = {k:.4g}: {told.by}"]
     if why_no_rays(shape):
         answer["repairs"] = list(getattr(shape, "repairs", ()))
         texts += answer["repairs"]
@@ -111,9 +104,9 @@ def _surface(
         creases = [{"kind": c.kind, "pieces": [int(number) for number in c.pieces]} for c in report.creases]
         answer |= {"pieces": report.pieces, "creases": creases}
     if getattr(shape, "fit", None) is not None:
-        told = "quality" in answer
+        known = "quality" in answer
         answer |= {"fit": shape.fit.to_json(), "quality": shape.quality.to_json(), "repairs": list(shape.repairs)}
-        if not told:
+        if not known:
             texts += [*shape.repairs, shape.quality.summary(wavenumber)]
         texts.append(str(shape.fit))
     texts.append(str(report))
@@ -164,12 +157,10 @@ def _mesh(
     texts += [*mesh.repairs, quality.summary(wavenumber)]
     if output is None:
         return
+    from creeping.commands.resuming import make_folder
     from creeping.plotting.mesh_picture import MeshValues, mesh_picture
 
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InvalidInputError(f"cannot make the folder {output}: {error}; choose another with -o") from error
+    make_folder(output)
     shown = MeshValues(mesh.vertices, mesh.triangles, quality.badness, quality.bad, Path(body).name)
     mesh_picture(output / "quality.png", shown)
     answer["picture"] = str(output / "quality.png")

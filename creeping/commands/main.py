@@ -79,7 +79,7 @@ def _as_options(text: str) -> str:
     from dataclasses import fields
     from inspect import signature
 
-    names = {field.name for kind in (options.FileOptions, _echo_command.EchoOptions) for field in fields(kind)}
+    names = {field.name for kind in (options.FileOptions, options.EchoOptions) for field in fields(kind)}
     names.update(*(signature(command).parameters for command in (run, _echo_command.ts)))
     # k is in messages whichever of three options gave it
     words = "|".join(sorted(names - {"wavenumber", "body", "file"}, key=len, reverse=True))
@@ -179,7 +179,7 @@ def run(
     from creeping.commands import run_field as _field_run
     from creeping.commands import run_plane as _plane_run
     from creeping.commands import run_report as _run_results
-    from creeping.commands import run_solved as _run_solved
+    from creeping.geometry.incident import PlaneWave, PointSource
     from creeping.geometry.parts import why_no_rays
     from creeping.rays.fan import enough_steps
     from creeping.rays.reach import ray_length
@@ -192,7 +192,11 @@ def run(
     wave: dict[str, Any] = {"frequency": frequency, "wavelength": wavelength, "sound_speed": sound_speed}
     wave |= {"polarisation": polarisation, "weighted": speed is not None}
     of = of or ("travel_time" if source is None else "eikonal")
-    incident = _run_results.asked_wave(direction, source)
+    if source is None and direction is None:
+        raise cr.InvalidInputError(
+            "give --direction X Y Z, where a plane wave travels, or --source X Y Z, a point source"
+        )
+    incident: Any = PlaneWave(direction or ()) if source is None else PointSource(source)
     job = _field_run.job(wavenumber, boundary, observe, direction, **wave)
     with Progress(quiet=json_) as progress:
         shape = parse_body(body, speed, options=file, cache=cache, progress=progress)
@@ -208,10 +212,10 @@ def run(
             print((output / resuming.SUMMARY).read_text() if json_ else f"nothing is missing in {output}")
             return 0
         if why_no_rays(shape):
-            result = _run_solved.run_solved(
+            result = _run_results.run_solved(
                 shape, job, incident, output, body, planes, tables, pictures, backend, progress, unfinished
             )
-            print(json.dumps(result, indent=1) if json_ else _run_solved.readable(result, output))
+            print(json.dumps(result, indent=1) if json_ else _run_results.readable_solved(result, output))
             return 0
         progress("shadow line")
         line = cr.shadow_line(shape, source=incident)

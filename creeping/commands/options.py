@@ -1,6 +1,7 @@
 """Options that several commands have: the body, the file that it comes from, the wave, what is written."""
 
 from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import Group, Parameter
@@ -13,7 +14,7 @@ Body = Annotated[
     ),
 ]
 SpeedOption = Annotated[str | None, Parameter(help="Speed c(x, y, z) of the weighted flow, e.g. '1 + x'.")]
-OUTPUT, FIELD = Group("Output"), Group("Field")
+OUTPUT, FIELD, ANGLES = Group("Output"), Group("Field"), Group("Angles")
 Frequency = Annotated[str | None, Parameter(group=FIELD, help='Instead of k, e.g. "10GHz": lengths are metres then.')]
 Wavelength = Annotated[str | None, Parameter(group=FIELD, help='Instead of k, e.g. "3cm".')]
 SoundSpeed = Annotated[
@@ -72,3 +73,60 @@ class FileOptions:
 
 
 AS_IT_IS = FileOptions()
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class EchoOptions:
+    """What of an echo is computed, what it is compared with, and what is written."""
+
+    frequency: Annotated[
+        str | None,
+        Parameter(help='One, e.g. "10GHz", or a band FIRST:LAST:STEP, e.g. "2:18:0.05GHz"; Hz, kHz, MHz, GHz.'),
+    ] = None
+    wavelength: Annotated[str | None, Parameter(help='Instead of a frequency, e.g. "3cm".')] = None
+    monostatic: Annotated[
+        str | None,
+        Parameter(
+            group=ANGLES,
+            help="Backscatter in a cut: az or el, whose step fits the lobes, or az:FIRST:LAST:STEP, degrees; az:20 or "
+            "az:20,el:5 is one direction. az for one frequency if nothing else is asked for.",
+        ),
+    ] = None
+    bistatic: Annotated[
+        str | None, Parameter(group=ANGLES, help="Observers in a cut, in the same forms, the radar at --incidence.")
+    ] = None
+    incidence: Annotated[
+        str | None,
+        Parameter(group=ANGLES, help="AZIMUTH,ELEVATION of the radar, degrees; of a cut the angle that stays. 0,0."),
+    ] = None
+    compare: Annotated[
+        Path | None,
+        Parameter(group=OUTPUT, help="Measured cut to compare with, a table with a column of angles or frequencies."),
+    ] = None
+    column: Annotated[
+        str | None,
+        Parameter(group=OUTPUT, help="Columns of --compare, one for each polarisation, if their names do not tell."),
+    ] = None
+    align: Annotated[
+        float, Parameter(group=OUTPUT, help="Largest shift of the measured angles that is tried, degrees.")
+    ] = 0.0
+    output: Annotated[Path | None, Parameter(name=["-o", "--output"], group=OUTPUT, help="Folder for the results.")] = (
+        None
+    )
+    method: Annotated[
+        str,
+        Parameter(
+            help="auto, rays, currents, equation or t-matrix: auto takes currents where rays do not resolve a value "
+            "and err more; equation solves the body's integral equation for every value, in seconds to minutes each; "
+            "t-matrix makes one matrix a frequency for all angles."
+        ),
+    ] = "auto"
+    cache: Cache = True
+    pictures: Pictures = True
+    formats: Formats = "csv"
+    json_: Json = False
+    resume: Resume = False
+
+
+AS_USUAL = EchoOptions()

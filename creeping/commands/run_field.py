@@ -24,7 +24,7 @@ from creeping.field.far import far_in_parts
 from creeping.field.far_result import FarField, turned_to_azimuth
 from creeping.field.forward import lobe_step
 from creeping.field.uncertainty import far_field_uncertainty
-from creeping.field.validity_range import Validity, validity
+from creeping.field.validity_range import validity
 from creeping.files.ffe import grid_directions
 from creeping.geometry.directions import unit_direction, unit_directions
 from creeping.geometry.incident import REMEDY, PlaneWave, incident_words
@@ -209,7 +209,9 @@ class Job:
         methods, counts = np.unique(far.method, return_counts=True)
         size = np.abs(far.total)
         finite = np.isfinite(size)
-        entry = {
+        largest, off = float(np.max(size[finite], initial=0.0)), far.stated_error
+        top = float(cross_section_decibels(largest))
+        entry: dict[str, Any] = {
             "wavenumber": self.wavenumber,
             "frequency": self.frequency,
             "unit": far.unit,
@@ -217,15 +219,18 @@ class Job:
             "order": far.order,
             "observe": [target.text for target in self.targets],
             "directions": len(far.directions),
-            "largest": float(np.max(size[finite], initial=0.0)),
-            "largest_db": _finite(cross_section_decibels(np.max(size[finite], initial=0.0))),
+            "largest": largest,
+            "largest_db": top if np.isfinite(top) else None,
             "not_finite": int(np.sum(~finite)),
             "methods": {str(name): int(count) for name, count in zip(methods, counts, strict=True)},
             "unresolved": int(far.unresolved.sum()),
-            "error": _stated_error(far),
+            "error": {"rms": None, "max": None, "by": None}
+            if off is None
+            else {"rms": off[0], "max": off[1], "by": far.error_source},
         }
         if isinstance(of, RayFan):
-            entry["validity"] = _named(validity(of, wavenumber=self.wavenumber))
+            found = validity(of, wavenumber=self.wavenumber)._asdict()
+            entry["validity"] = {name: float(one) if np.isfinite(one) else None for name, one in found.items()}
             if hasattr(of.body, "coarse_fit"):
                 entry["uncertain_by"] = self._uncertainty(far, of)
         return entry, names
@@ -262,13 +267,21 @@ class Job:
 
     def _pictures(self, far: FarField, of: RayFan | Solution, output: Path, backend: str, name: str) -> list[str]:
         names = []
-        title = f"{name}, {_place(of)}\n{self.told(far.unit)}, {far.boundary}{_off(far)}".replace("$", r"\$")
+        source = of.line.source if isinstance(of, RayFan) else PlaneWave(of.directions[0])
+        known = far.error[np.isfinite(far.error)]
+        off = f"; error {np.median(known):.1g} {far.unit} in the median" if len(known) else ""
+        title = f"{name}, {incident_words(source)}\n{self.told(far.unit)}, {far.boundary}{off}".replace("$", r"\$")
         # cuts of one step are one picture
         cuts: dict[int, dict[str, FarField]] = {}
         for target, piece in zip(self.targets, self._pieces(far), strict=True):
             if target.kind == "cut":
                 cuts.setdefault(len(target.theta), {})[f"φ = {np.degrees(target.phi[0]):g}°"] = piece
-        drawn = [one for one in cuts.values() if any(_visible(piece) for piece in one.values())]
+        # zeros, and what is not finite, cannot be drawn in decibels
+        drawn = [
+            one
+            for one in cuts.values()
+            if any(np.any(np.isfinite(piece.total) & (piece.total != 0)) for piece in one.values())
+        ]
         for number, group in enumerate(drawn, 1):
             theta = next(t.theta for t in self.targets if len(t.theta) == len(next(iter(group.values())).total))
             words: dict[str, Any] = {"quantity": "rcs", "components": self.components, "title": title, "dpi": DPI}
@@ -287,26 +300,6 @@ class Job:
             plotting.surface_field_picture(output / "field.png", of, backend=backend, dpi=DPI, **options)
             names.append("field.png")
         return names
-
-
-def _place(of: RayFan | Solution) -> str:
-    """The incident wave, in words."""
-    return incident_words(of.line.source if isinstance(of, RayFan) else PlaneWave(of.directions[0]))
-
-
-def _off(far: FarField) -> str:
-    """How large the error of |f| is, in words; nothing where it is not known."""
-    known = far.error[np.isfinite(far.error)]
-    return f"; error {np.median(known):.1g} {far.unit} in the median" if len(known) else ""
-
-
-def _visible(piece: FarField) -> bool:
-    """Whether a field has a value that can be drawn in decibels."""
-    return bool(np.any(np.isfinite(piece.total) & (piece.total != 0)))
-
-
-def _finite(value: Any) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 def job(
@@ -346,7 +339,9 @@ def job(
         raise InvalidInputError(f"the field of --wavenumber is that of a plane wave; --source is {REMEDY}")
     k, hertz = asked_wavenumber(wavenumber, frequency, wavelength, sound_speed)
     d = unit_direction(direction)
-    targets = tuple(parse_target(text, d) for text in observe or [_own_cut(d)])
+    # the cut through the direction of the wave; of one along z that of phi = 0
+    azimuth = 0.0 if np.hypot(d[0], d[1]) < 1e-9 else np.degrees(np.arctan2(d[1], d[0]))
+    targets = tuple(parse_target(text, d) for text in observe or [f"cut:{azimuth:.10g}"])
     if sum(target.kind == "grid" for target in targets) > 1:
         raise InvalidInputError("--observe names several grids; give one, far.ffe holds no more")
     kind = _boundary(boundary or "soft")
@@ -434,22 +429,3 @@ def _numbers(text: str, rest: str, count: int) -> list[float]:
     if len(numbers) != count or not np.all(np.isfinite(numbers)):
         raise InvalidInputError(f"--observe {text!r} is unknown; give {FORMS}")
     return numbers
-
-
-def _own_cut(direction: FloatArray) -> str:
-    """The cut through the direction of the wave; φ = 0 if that is along z."""
-    level = np.hypot(direction[0], direction[1]) < 1e-9
-    return f"cut:{0.0 if level else np.degrees(np.arctan2(direction[1], direction[0])):.10g}"
-
-
-def _stated_error(far: FarField) -> dict[str, Any]:
-    """Rms and largest error of the field, and what tells it; None where it is not known."""
-    off = far.stated_error
-    if off is None:
-        return {"rms": None, "max": None, "by": None}
-    return {"rms": off[0], "max": off[1], "by": far.error_source}
-
-
-def _named(found: Validity) -> dict[str, float | None]:
-    """By name; None where there is no number."""
-    return {name: float(value) if np.isfinite(value) else None for name, value in found._asdict().items()}
