@@ -45,7 +45,7 @@ def explore(
     """Turn the incidence by hand, and watch shadow line, rays, iso-phase curves and field follow."""
     import creeping as cr
     from creeping.errors import CreepingError, InvalidInputError
-    from creeping.explorer.preview import step_of, steps_of
+    from creeping.explorer.frames import step_of, steps_of
     from creeping.explorer.request import ViewRequest, angles
     from creeping.geometry.directions import unit_direction
     from creeping.geometry.surface import size

@@ -4,13 +4,12 @@ import html
 import os
 from pathlib import Path
 
+from creeping.explorer.door import with_title
+from creeping.explorer.frames import Preview, Refined, preview_of, refined_view, step_of
 from creeping.explorer.page import LocalServer
-from creeping.explorer.preview import Preview, preview_of, step_of
-from creeping.explorer.refined import Refined, refined_view
+from creeping.explorer.panel import cut_svg, legend, plane_svg, refined_text, validity_text
 from creeping.explorer.request import ViewRequest
 from creeping.explorer.scene import DrawnBody, Scene
-from creeping.explorer.svg import cut_svg, plane_svg
-from creeping.explorer.text import legend, refined_text, validity_text, with_title
 from creeping.explorer.wave import fitted_span
 from creeping.files import write_text
 from creeping.rays.transport import Flow

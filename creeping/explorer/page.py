@@ -28,12 +28,10 @@ import viser
 from creeping._typing import Any
 from creeping.errors import CreepingError
 from creeping.explorer.door import Door
-from creeping.explorer.preview import Preview, preview_of, step_of
-from creeping.explorer.refined import Refined, far_cut, refined_view
+from creeping.explorer.frames import Preview, Refined, far_cut, preview_of, refined_view, step_of
+from creeping.explorer.panel import cut_svg, legend, plane_svg, preview_plane_svg, preview_text, refined_text, wave_note
 from creeping.explorer.request import BOUNDARIES, RAYS, ViewRequest, angles, wave_scale
 from creeping.explorer.scene import DrawnBody, Paint, Scene, turned
-from creeping.explorer.svg import cut_svg, plane_svg, preview_plane_svg
-from creeping.explorer.text import legend, preview_text, refined_text, titled, wave_note
 from creeping.explorer.wave import Span, fitted_span
 from creeping.field.body_currents import expected_nodes
 from creeping.field.lit_ground import convex
@@ -63,10 +61,10 @@ class LocalServer(viser.ViserServer):  # type: ignore[misc]
     """A quiet server for this machine alone."""
 
     def __init__(self, port: int, name: str = "creeping") -> None:
-        self.door = Door(lambda: len(self._websock_server._live_connections))
+        self.door = Door(lambda: len(self._websock_server._live_connections), name)
         # the address is shown by whoever starts it
         try:
-            with redirect_stdout(StringIO()), self.door.installed(), titled(name):
+            with redirect_stdout(StringIO()), self.door.installed():
                 super().__init__(HOST, port, label=name, verbose=False)
         except CreepingError:
             self.stop()

@@ -10,8 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from creeping._typing import Any, ComplexArray, FloatArray
-from creeping.explorer.preview import NOTHING, Preview, joined, outline
-from creeping.explorer.refined import Refined
+from creeping.explorer.frames import NOTHING, Preview, Refined, joined, outline
 from creeping.explorer.wave import (
     ENDED,
     LEVEL_COLOURS,
