@@ -7,6 +7,7 @@ import inspect
 import os
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -155,6 +156,29 @@ def table_formats(text: str) -> tuple[str, ...]:
     if not {"csv", "mat"} >= set(names) or len(set(names)) < len(names):
         raise InvalidInputError(f"--format {text!r}: give some of csv, mat, each once")
     return names
+
+
+@dataclass(frozen=True)
+class Output:
+    """Where results of a body are written, and how.
+
+    Attributes
+    ----------
+    folder : Path
+    name : str
+        Of the body, for titles.
+    formats : tuple of str
+        Kinds of tables.
+    pictures : bool
+    backend : str
+        Of pictures in space.
+    """
+
+    folder: Path
+    name: str
+    formats: tuple[str, ...] = ("csv",)
+    pictures: bool = True
+    backend: str = "auto"
 
 
 def write_tables(

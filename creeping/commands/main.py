@@ -21,7 +21,7 @@ from creeping.commands import explore as _explore_command
 from creeping.commands import options, resuming
 from creeping.commands import sweep as _sweep_command
 from creeping.commands import upkeep as _upkeep
-from creeping.commands.body import flow_of, parse_body, table_formats, title_of
+from creeping.commands.body import Output, flow_of, parse_body, table_formats, title_of
 
 app = App(
     name="creeping",
@@ -185,7 +185,7 @@ def run(
     from creeping.rays.reach import ray_length
 
     started = time.perf_counter()
-    tables = table_formats(formats)
+    written = Output(output, title_of(body), table_formats(formats), pictures, backend)
     for name, value in (("length", length), ("spacing", spacing)):
         if isinstance(value, float) and not (np.isfinite(value) and value > 0):
             raise cr.CreepingError(f"--{name} {value!r} is not a positive finite number")
@@ -200,7 +200,9 @@ def run(
     job = _field_run.job(wavenumber, boundary, observe, direction, **wave)
     with Progress(quiet=json_) as progress:
         shape = parse_body(body, speed, options=file, cache=cache, progress=progress)
-        planes = _plane_run.asked_planes(plane, job)
+        planes = [_plane_run.parse_plane(text) for text in plane or ()]
+        if planes and job is None:
+            raise cr.InvalidInputError("--plane needs --wavenumber or --frequency, which ask for the field")
         if job:
             told = job.forecast(shape, incident)
             progress.note(told.body)
@@ -212,9 +214,7 @@ def run(
             print((output / resuming.SUMMARY).read_text() if json_ else f"nothing is missing in {output}")
             return 0
         if why_no_rays(shape):
-            result = _run_results.run_solved(
-                shape, job, incident, output, body, planes, tables, pictures, backend, progress, unfinished
-            )
+            result = _run_results.run_solved(shape, job, incident, planes, written, progress, unfinished)
             print(json.dumps(result, indent=1) if json_ else _run_results.readable_solved(result, output))
             return 0
         progress("shadow line")
@@ -235,18 +235,14 @@ def run(
                 progress("field")
                 far, field_seconds = job.far_field(fan, unfinished, progress.told)
             progress("pictures and files" if pictures else "files")
-            drawn_with = backend if pictures else None
-            summary["files"], summary["drawn_by"] = _run_results.write_results(
-                output, line, fan, curves, drawn_with, tables, name=title_of(body), **(job.wave if job else {})
-            )
-            written: dict[str, Any] = {"pictures": pictures, "formats": tables}
+            asked = job.wave if job else {}
+            summary["files"], summary["drawn_by"] = _run_results.write_results(line, fan, curves, written, **asked)
             if job:
-                summary["field"], names = job.write(far, fan, output, backend, title_of(body), **written)
+                summary["field"], names = job.write(far, fan, written)
                 summary["field"]["seconds"] = field_seconds
                 summary["files"][-1:-1] = names
             if job and planes:
-                given = planes, job, fan, output, title_of(body), progress
-                summary["planes"], names = _plane_run.write_planes(*given, **written)
+                summary["planes"], names = _plane_run.write_planes(planes, job, fan, written, progress)
                 summary["files"][-1:-1] = names
             summary["seconds"] = round(time.perf_counter() - started, 2)
             unfinished.write_summary(summary, complete=True)

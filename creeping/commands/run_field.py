@@ -3,14 +3,13 @@
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from creeping import files, plotting
 from creeping._typing import ArrayLike, FloatArray
-from creeping.commands.body import write_tables
+from creeping.commands.body import Output, write_tables
 from creeping.commands.forecast import Forecast, forecast, radar_of
 from creeping.commands.resuming import Unfinished
 from creeping.commands.wave import asked_wavenumber, cure_of, frequency_words
@@ -39,9 +38,6 @@ DPI = 200
 MOST = 200_000
 """Directions of one run."""
 FORMS = "cut:PHI, cut:PHI:STEP, grid:STEP, THETA,PHI or backscatter, in degrees"
-WAVES = ("--wavenumber", "--frequency", "--wavelength")
-FINEST = 0.05
-"""Step, degrees, of a cut that is not given one, at the least."""
 POLARISATIONS = {"VV": "tt", "VH": "tp", "HV": "pt", "HH": "pp"}
 """Received and transmitted, V along theta and H along phi, and the names of the components in pictures."""
 
@@ -91,7 +87,8 @@ class Job:
 
     def fitted(self, body: Surface) -> "Job":
         """The job with cuts whose step fits the lobes, of those that have none given."""
-        step = max(lobe_step(body, self.wavenumber, monostatic=False), FINEST)
+        # no finer than a twentieth of a degree
+        step = max(lobe_step(body, self.wavenumber, monostatic=False), 0.05)
         found = replace(self, targets=tuple(target.fitted(step) for target in self.targets))
         found.check_count()
         return found
@@ -119,6 +116,11 @@ class Job:
         """Wavenumber and boundary, as pictures ask for them."""
         return {"wavenumber": self.wavenumber, "boundary": self.boundary}
 
+    @property
+    def asked(self) -> dict[str, Any]:
+        """Wavenumber, boundary and order, as fields ask for them."""
+        return self.wave | {"order": ORDER}
+
     def told(self, unit: str) -> str:
         """Wavenumber and frequency in words."""
         wave = f"k = {self.wavenumber:g}/{unit}"
@@ -131,7 +133,6 @@ class Job:
     ) -> tuple[FarField, float]:
         """Far field in the directions of all targets, one after the other, and the seconds that it took."""
         started = time.perf_counter()
-        asked: dict[str, Any] = {"wavenumber": self.wavenumber, "boundary": self.boundary, "order": ORDER}
         parts, there = unfinished.kept_parts(), list[FarField]()
         count = len(self.directions)
 
@@ -147,7 +148,7 @@ class Job:
             return found
 
         try:
-            far = far_in_parts(fan, self.directions, keep=keep, **asked)
+            far = far_in_parts(fan, self.directions, keep=keep, **self.asked)
         except BaseException:
             if there:
                 self._write_rows(FarField.joined(there), unfinished)
@@ -190,22 +191,12 @@ class Job:
             far = replace(far, total=np.einsum("nab,nbc->nac", turn, far.total), parts=parts, error=error)
         return replace(far, unit=self.unit or far.unit)
 
-    def write(
-        self,
-        far: FarField,
-        of: RayFan | Solution,
-        output: Path,
-        backend: str,
-        name: str,
-        *,
-        pictures: bool = True,
-        formats: Sequence[str] = ("csv",),
-    ) -> tuple[dict[str, Any], list[str]]:
-        """Write the files of a far field of the body ``name``; returns the entry of the summary and their names."""
+    def write(self, far: FarField, of: RayFan | Solution, output: Output) -> tuple[dict[str, Any], list[str]]:
+        """Write the files of a far field; returns the entry of the summary and their names."""
         direction = of.line.direction if isinstance(of, RayFan) else of.directions[0]
-        names = self._tables(far, direction, output, formats)
-        if pictures:
-            names += self._pictures(far, of, output, backend, name)
+        names = self._tables(far, direction, output)
+        if output.pictures:
+            names += self._pictures(far, of, output)
         methods, counts = np.unique(far.method, return_counts=True)
         size = np.abs(far.total)
         finite = np.isfinite(size)
@@ -237,9 +228,8 @@ class Job:
 
     def _uncertainty(self, far: FarField, fan: RayFan) -> dict[str, Any]:
         """Rms and largest change on the second fit, or why there is none to tell."""
-        asked: dict[str, Any] = {"wavenumber": self.wavenumber, "boundary": self.boundary, "order": ORDER}
         try:
-            change = far_field_uncertainty(fan, far.directions, **asked)
+            change = far_field_uncertainty(fan, far.directions, **self.asked)
         except CreepingError as error:
             # the second fit may have a shadow line that cannot be followed
             return {"rms": None, "max": None, "reason": str(error)}
@@ -253,24 +243,32 @@ class Job:
         ends = np.cumsum([len(target.directions) for target in self.targets])
         return [far.take(slice(end - len(t.directions), end)) for t, end in zip(self.targets, ends, strict=True)]
 
-    def _tables(self, far: FarField, direction: FloatArray, output: Path, formats: Sequence[str]) -> list[str]:
+    def _tables(self, far: FarField, direction: FloatArray, output: Output) -> list[str]:
         texts = [target.text for target in self.targets for _ in target.directions]
         angles = np.concatenate([target.angles for target in self.targets])
-        names = write_tables(output / "far", formats, far, observed=(texts, angles), far=far)
+        names = write_tables(output.folder / "far", output.formats, far, observed=(texts, angles), far=far)
         for target, piece in zip(self.targets, self._pieces(far), strict=True):
             # a .ffe file holds no infinity; the table does
             if target.kind == "grid" and np.all(np.isfinite(piece.total)):
-                where = output / "far.ffe"
+                where = output.folder / "far.ffe"
                 files.write_ffe(where, piece, target.theta, target.phi, direction=direction)
                 names.append(where.name)
         return names
 
-    def _pictures(self, far: FarField, of: RayFan | Solution, output: Path, backend: str, name: str) -> list[str]:
-        names = []
+    def _pictures(self, far: FarField, of: RayFan | Solution, output: Output) -> list[str]:
+        names, folder = [], output.folder
+        shown: dict[str, Any] = {
+            "wave": self.told(far.unit),
+            "name": output.name,
+            "backend": output.backend,
+            "dpi": DPI,
+        }
         source = of.line.source if isinstance(of, RayFan) else PlaneWave(of.directions[0])
         known = far.error[np.isfinite(far.error)]
         off = f"; error {np.median(known):.1g} {far.unit} in the median" if len(known) else ""
-        title = f"{name}, {incident_words(source)}\n{self.told(far.unit)}, {far.boundary}{off}".replace("$", r"\$")
+        title = f"{output.name}, {incident_words(source)}\n{self.told(far.unit)}, {far.boundary}{off}".replace(
+            "$", r"\$"
+        )
         # cuts of one step are one picture
         cuts: dict[int, dict[str, FarField]] = {}
         for target, piece in zip(self.targets, self._pieces(far), strict=True):
@@ -286,18 +284,14 @@ class Job:
             theta = next(t.theta for t in self.targets if len(t.theta) == len(next(iter(group.values())).total))
             words: dict[str, Any] = {"quantity": "rcs", "components": self.components, "title": title, "dpi": DPI}
             names.append("far.png" if number == 1 else f"far_{number}.png")
-            plotting.far_cut_picture(output / names[-1], theta, group, parts=len(group) == 1, angle_name="θ", **words)
+            plotting.far_cut_picture(folder / names[-1], theta, group, parts=len(group) == 1, angle_name="θ", **words)
         if far.error_by == "extinction":
             currents = cached_currents(of, self.wavenumber, self.boundary) if isinstance(of, RayFan) else of.currents()
-            plotting.currents_picture(
-                output / "field.png", currents, wave=self.told(far.unit), name=name, backend=backend, dpi=DPI
-            )
+            plotting.currents_picture(folder / "field.png", currents, **shown)
             names.append("field.png")
         # at points between rays the field needs a smooth body
         elif isinstance(of, RayFan) and self.boundary != "pec" and not is_piecewise(of.body):
-            options: dict[str, Any] = {"wavenumber": self.wavenumber, "boundary": self.boundary, "order": ORDER}
-            options |= {"wave": self.told(far.unit), "name": name}
-            plotting.surface_field_picture(output / "field.png", of, backend=backend, dpi=DPI, **options)
+            plotting.surface_field_picture(folder / "field.png", of, **self.asked, **shown)
             names.append("field.png")
         return names
 
@@ -346,7 +340,8 @@ def job(
         raise InvalidInputError("--observe names several grids; give one, far.ffe holds no more")
     kind = _boundary(boundary or "soft")
     unit = "m" if wavenumber is None else None
-    ((option, text),) = ((name, value) for name, value in zip(WAVES, given, strict=True) if value is not None)
+    names = ("--wavenumber", "--frequency", "--wavelength")
+    option, text = next(one for one in zip(names, given, strict=True) if one[1] is not None)
     found = Job(k, kind, targets, unit, hertz, _components(polarisation, kind), cure_of(option, text, hertz))
     found.check_count()
     return found

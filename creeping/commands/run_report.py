@@ -1,7 +1,6 @@
 """What one ``creeping run`` says and writes, of rays and of bodies without them. Part of the command line."""
 
 import time
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ import numpy as np
 from creeping import files, plotting
 from creeping._progress import Progress
 from creeping._version import __version__
-from creeping.commands.body import title_of, write_tables
+from creeping.commands.body import Output, write_tables
 from creeping.commands.forecast import boundary_words
 from creeping.commands.resuming import Unfinished, kept
 from creeping.commands.run_field import DPI, Job
@@ -76,30 +75,24 @@ def summary_of(body: str, speed: str | None, line: Any, carrier: Any, fan: Any, 
     return summary
 
 
-def write_results(
-    output: Path,
-    line: Any,
-    fan: Any,
-    curves: list[Any],
-    backend: str | None,
-    formats: Sequence[str] = ("csv",),
-    **wave: Any,
-) -> tuple[list[str], str | None]:
-    """Write data files and pictures, none without a backend; their names, and what drew the pictures.
+def write_results(line: Any, fan: Any, curves: list[Any], output: Output, **wave: Any) -> tuple[list[str], str | None]:
+    """Write data files and pictures; their names, and what drew the pictures.
 
-    ``wave`` is what pictures are told besides: the body's name, wavenumber and boundary.
+    ``wave`` is what pictures are told besides: wavenumber and boundary.
     """
+    folder = output.folder
     # pictures last: a graphics driver that ends the process shall not take the numbers with it
-    files.write_vtp(output / "line.vtp", line=line)
-    files.write_vtp(output / "rays.vtp", fan=fan)
-    files.write_vtp(output / "curves.vtp", curves=curves)
+    files.write_vtp(folder / "line.vtp", line=line)
+    files.write_vtp(folder / "rays.vtp", fan=fan)
+    files.write_vtp(folder / "curves.vtp", curves=curves)
     tables: dict[str, tuple[str, Any]] = {"line": ("line", line), "rays": ("fan", fan), "curves": ("curves", curves)}
     for name, (kind, what) in tables.items():
-        write_tables(output / name, formats, what, **{kind: what})
-    names, drawn_by = [f"{n}.{kind}" for kind in ("vtp", *formats) for n in tables], None
-    if backend is not None:
-        drawn_by = plotting.picture(output / "rays.png", line, fan, curves, backend=backend, dpi=DPI, **wave)
-        plotting.parameter_picture(output / "parameters.png", line, fan, curves, dpi=DPI, **wave)
+        write_tables(folder / name, output.formats, what, **{kind: what})
+    names, drawn_by = [f"{n}.{kind}" for kind in ("vtp", *output.formats) for n in tables], None
+    if output.pictures:
+        wave["name"] = output.name
+        drawn_by = plotting.picture(folder / "rays.png", line, fan, curves, backend=output.backend, dpi=DPI, **wave)
+        plotting.parameter_picture(folder / "parameters.png", line, fan, curves, dpi=DPI, **wave)
         names = ["rays.png", "parameters.png", *names]
     return [*names, "summary.json"], drawn_by
 
@@ -173,17 +166,7 @@ def readable(summary: dict[str, Any], output: Path) -> str:
 
 
 def run_solved(
-    shape: Any,
-    job: Job | None,
-    incident: Any,
-    output: Path,
-    body: str,
-    planes: Any,
-    formats: Sequence[str],
-    pictures: bool,
-    backend: str,
-    progress: Progress,
-    unfinished: Unfinished,
+    shape: Any, job: Job | None, incident: Any, planes: Any, output: Output, progress: Progress, unfinished: Unfinished
 ) -> dict[str, Any]:
     """Write the far field of a plane wave on a body without rays; returns the summary.
 
@@ -202,12 +185,10 @@ def run_solved(
     started = time.perf_counter()
     with kept(unfinished, progress.message):
         solution, far, seconds = job.solved(shape, incident.direction, progress, unfinished)
-        progress("pictures and files" if pictures else "files")
-        summary: dict[str, Any] = {"body": body, "version": __version__, **wave_entry(incident)}
+        progress("pictures and files" if output.pictures else "files")
+        summary: dict[str, Any] = {"body": unfinished.asked["body"], "version": __version__, **wave_entry(incident)}
         summary |= {"rays": None, "without_rays": why_no_rays(shape), "nodes": solution.nodes}
-        summary["field"], names = job.write(
-            far, solution, output, backend, title_of(body), pictures=pictures, formats=formats
-        )
+        summary["field"], names = job.write(far, solution, output)
         summary["field"]["seconds"], summary["files"] = seconds, [*names, "summary.json"]
         summary["seconds"] = round(time.perf_counter() - started, 2)
         unfinished.write_summary(summary, complete=True)
