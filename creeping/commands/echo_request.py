@@ -19,7 +19,6 @@ from creeping.geometry.surface import Surface
 from creeping.sweeping.results import POLARISATIONS
 
 AXES = {"az": "azimuth", "el": "elevation"}
-WHOLE = {"azimuth": (0.0, 360.0), "elevation": (-90.0, 90.0)}
 MOST = 200_000
 """Angles of a cut."""
 FORMS = "az or el for a cut, az:FIRST:LAST:STEP for a part of one, az:20 or az:20,el:5 for one direction"
@@ -195,7 +194,7 @@ def _cut(option: str, text: str | None) -> tuple[str, tuple[float, float], float
         raise InvalidInputError(f"{option} {text!r} is unknown; give {FORMS}, in degrees")
     name = AXES[short]
     if not rest:
-        return name, WHOLE[name], None
+        return name, (0.0, 360.0) if name == "azimuth" else (-90.0, 90.0), None
     numbers = _numbers(option, rest.replace(":", ","), rest.count(":") + 1)
     if len(numbers) != 3:
         raise InvalidInputError(f"{option} {text!r} has {len(numbers)} numbers; give {FORMS}, in degrees")

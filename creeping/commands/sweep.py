@@ -15,13 +15,10 @@ from creeping._progress import Progress
 from creeping.commands import options
 from creeping.commands.body import flow_of, is_file, parse_body
 
-PARTIAL, ALL_FAILED = 4, 3
-"""Exit codes: of a sweep that --resume would go on with, for what is missing or failed; of one without results."""
-PILOT = 2
-"""Tasks by which a sweep is timed; the first may have to compile."""
+_workers = Group("Workers")
+
 LARGE = 1800.0
 """Seconds left from which a sweep is shared among the cores by itself."""
-_workers = Group("Workers")
 
 
 def sweep(
@@ -102,8 +99,8 @@ def sweep(
         summary["resume"] = shlex.join(again)
     print(json.dumps(summary, indent=1) if json_ else _readable(summary))
     if failed == len(plan.incidences):
-        return ALL_FAILED
-    return PARTIAL if failed or not complete else 0
+        return 3
+    return 4 if failed or not complete else 0
 
 
 def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Progress) -> tuple[Any, Any]:
@@ -167,7 +164,8 @@ def _run(plan: Any, store: Any, scheduler: str | None, workers: int | None, mete
     with _stopping(meter) as asked:
         told: dict[str, Any] = {"progress": meter.told, "stop": asked.is_set}
         if scheduler is None and workers is None:
-            complete = fill(plan, store, most=PILOT, **told)
+            # two tasks time a sweep: the first may have to compile
+            complete = fill(plan, store, most=2, **told)
             # cores, unless the user has fewer in mind
             if complete or asked.is_set() or meter.left() < LARGE or thread_count() == 1:
                 return complete or fill(plan, store, **told), meter.done_now

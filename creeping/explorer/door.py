@@ -30,9 +30,6 @@ from websockets.http11 import Request, Response
 from creeping._typing import Any
 from creeping.errors import CreepingError
 
-LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
-LARGEST = 1_000_000
-"""Bytes of a message from a page: a slider's are hundreds."""
 CLIENTS = 16
 """Pages that may be open."""
 _PATCHING = Lock()
@@ -60,7 +57,7 @@ class Door:
 
     def refusal(self, request: Request, port: int) -> str:
         """Why a request is not let in; nothing if it is."""
-        own = {f"{name}:{port}" for name in LOOPBACK}
+        own = {f"{name}:{port}" for name in ("127.0.0.1", "localhost", "[::1]")}
         hosts, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
         if len(hosts) != 1 or hosts[0].lower() not in own:
             return "this page is for this machine, by its own name"
@@ -127,7 +124,8 @@ class Door:
                     found.headers["Set-Cookie"] = cookie
                 return found
 
-            return serve(*arguments, process_request=checked, max_size=LARGEST, **options)
+            # bytes of a message from a page: a slider's are hundreds
+            return serve(*arguments, process_request=checked, max_size=1_000_000, **options)
 
         with _PATCHING:
             websocket_server.serve = guarded  # type: ignore[assignment, misc]

@@ -44,13 +44,11 @@ REST = 0.4
 """Seconds for which the hand rests before work begins that would hold up its next move."""
 FOLLOWING = 4.0
 """Step of the far-field cut while the hand moves, degrees."""
-PACE, FOLLOWED = 0.25, 60_000
-"""Seconds between two such cuts at least, and nodes of the body's currents up to which they are made, in about half a
-second; beyond, the cut waits until the hand rests."""
+PACE = 0.25
+"""Seconds between two such cuts at least."""
 
 T = TypeVar("T")
 
-SHOWS = ("level", "wave")
 STEP = 30
 """Degrees between two pictures of a running wave."""
 PLAYING_PACE = 0.15
@@ -297,7 +295,10 @@ class Explorer:
             (frame, number), _ = taken
             request, began = frame.request, time.perf_counter()
             try:
-                if speed_of(self.flow.body) is not None or not self._follows(frame):
+                # of more nodes a cut takes more than half a second, and waits until the hand rests
+                if speed_of(self.flow.body) is not None or not len(frame.fan.points):
+                    continue
+                if expected_nodes(frame.fan, request.wavenumber) >= 60_000:
                     continue
                 # currents of a body that faces itself take seconds
                 method = "auto" if convex(frame.fan) else "rays"
@@ -314,10 +315,6 @@ class Explorer:
                 self.status.content = error_text(error)
             # the hand comes first: as long a rest as the work took
             time.sleep(max(PACE, time.perf_counter() - began))
-
-    def _follows(self, frame: Preview) -> bool:
-        """Whether the cut of a frame can be had while the hand moves."""
-        return len(frame.fan.points) > 0 and expected_nodes(frame.fan, frame.request.wavenumber) < FOLLOWED
 
     def _refine(self) -> None:
         """Follow up when the hand rests."""
@@ -418,7 +415,7 @@ class Player:
     def __init__(self, gui: Any, redraw: Callable[[], None], recolour: Callable[[], None]) -> None:
         self._redraw, self._recolour = redraw, recolour
         self.show = gui.add_dropdown(
-            "show", SHOWS, initial_value=SHOWS[0], hint="20 log10 |u|, or Re(u e^(-i omega t))"
+            "show", ("level", "wave"), initial_value="level", hint="20 log10 |u|, or Re(u e^(-i omega t))"
         )
         self.slider = gui.add_slider("phase, omega t (degrees)", 0, 360, STEP // 6, 0, disabled=True)
         self.play = gui.add_checkbox("play", False, disabled=True, hint="Let the wave run")

@@ -204,10 +204,6 @@ def _picture(name: str, height: float, parts: Iterable[str]) -> str:
     return f'<svg id="{name}" xmlns="http://www.w3.org/2000/svg" {box}>{"".join(parts)}</svg>'
 
 
-ARCS = {"arc: tilts d": "#ff2060", "tilts d": "#20df80", "turns d about itself": "#2080ff"}
-"""Of the handles on the page, in the colours that they have there."""
-
-
 def preview_text(frame: Preview, seconds: float, span: tuple[float, float]) -> str:
     """The fan in a few words, with the range of its colours in dB."""
     request, fan = frame.request, frame.fan
@@ -283,7 +279,8 @@ def legend(frame: Preview, span: Span, *, still: bool = False, wave: bool = Fals
     line = dict(zip(("shadow line", "occluded", "concave"), STATUS_COLOURS.values(), strict=True))
     rows.append(_keys(line | {"outline": RAY_COLOUR, "no ray": "#{:02x}{:02x}{:02x}".format(*ENDED)}))
     if not still:
-        rows.append(_keys(ARCS))
+        # handles, in the colours that they have on the page
+        rows.append(_keys({"arc: tilts d": "#ff2060", "tilts d": "#20df80", "turns d about itself": "#2080ff"}))
     placed = "".join(f'<g transform="translate(0 {24 * number})">{row}</g>' for number, row in enumerate(rows))
     box = f'viewBox="0 0 360 {24 * len(rows)}" width="100%"'
     return f'<svg id="bar" xmlns="http://www.w3.org/2000/svg" {box}>{placed}</svg>'

@@ -32,12 +32,6 @@ from creeping.plotting.coloured_body import LEAST_SAMPLES, samples_a_wave
 
 CELLS = 44
 """Of the drawn body along each side of its box."""
-INSET = 0.004
-"""How much smaller the drawn body is, in body sizes."""
-CAMERA = 3.9
-"""Distance of the camera, in radii of the body's box."""
-WIDTHS = {"rays": 1.5, "levels": 2.0, "line": 4.0, "outline": 1.5}
-"""Of lines, in pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +68,8 @@ class DrawnBody:
 
     @property
     def inset(self) -> FloatArray:
-        """Vertices as drawn (n, 3)."""
-        return np.asarray(self.mesh.vertices - INSET * size(self.body) * self.normals)
+        """Vertices as drawn (n, 3), a little inside of the body."""
+        return np.asarray(self.mesh.vertices - 0.004 * size(self.body) * self.normals)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +136,7 @@ class Scene:
         """Start the camera on the shadow side."""
         toward = shadow_view(direction).toward
         self.server.initial_camera.look_at = self.model.centre
-        self.server.initial_camera.position = self.model.centre + CAMERA * self.model.radius * toward
+        self.server.initial_camera.position = self.model.centre + 3.9 * self.model.radius * toward
         self.server.initial_camera.fov = float(np.radians(40))
 
     def turn(self, direction: FloatArray) -> None:
@@ -240,7 +234,7 @@ class Scene:
             return
         paint = np.array(rgb(colours), dtype=np.uint8) if isinstance(colours, str) else LINEAR[colours]
         if handle is None:
-            width = WIDTHS[name.split("/")[0]]
+            width = {"rays": 1.5, "levels": 2.0, "line": 4.0, "outline": 1.5}[name.split("/")[0]]
             self._lines[name] = self.scene.add_line_segments(
                 f"/{name}", points, paint, thickness=width, thickness_units="screen"
             )

@@ -37,13 +37,11 @@ from creeping.storage.atomic import written_aside
 if TYPE_CHECKING:
     from creeping.field.far_result import FarField
 
-MOST_BYTES = 512_000_000
 MOST_BLOCKS = 10_000
 MOST_ROWS, MOST_KEYS = 5_000_000, 100
 """Rows of a file, and keys of a block."""
 COLUMNS = ("Theta", "Phi", "Re(Etheta)", "Im(Etheta)", "Re(Ephi)", "Im(Ephi)")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
-_WHOLE = re.compile(r"\d{1,9}", re.ASCII)
 
 
 def grid_directions(theta: ArrayLike, phi: ArrayLike) -> FloatArray:
@@ -264,7 +262,7 @@ def read_ffe(path: str | os.PathLike[str]) -> tuple[FfeBlock, ...]:
 
 def _blocks(file: Path) -> Iterator[FfeBlock]:
     block, number, blocks, rows = _Open(), 0, 0, 0
-    for number, line in lines_of(file, MOST_BYTES, 4096):
+    for number, line in lines_of(file, 512_000_000, 4096):
         if line.startswith(("##", "**")):
             continue
         if line.startswith("#"):
@@ -320,7 +318,7 @@ def _closed(file: Path, number: int, block: _Open) -> FfeBlock:
     """The block that ends before a line."""
     sizes = []
     for key in ("No. of Theta Samples", "No. of Phi Samples"):
-        if not _WHOLE.fullmatch(block.keys.get(key, "")):
+        if not re.fullmatch(r"[0-9]{1,9}", block.keys.get(key, "")):
             raise InvalidInputError(f"{file}, block before line {number}: no whole number as {key!r}")
         sizes.append(int(block.keys[key]))
     rows = np.array(block.rows).reshape(-1, len(COLUMNS))

@@ -22,19 +22,11 @@ MOST_BYTES = 200_000_000
 """Largest file that is read."""
 MOST_ROWS, MOST_NUMBERS = 1_000_000, 20_000_000
 """Rows of a table, and numbers in all of them."""
-MOST_HEADERS = 10_000
-"""Lines of words and comments above the numbers."""
 LONGEST = 65_536
 """Characters of a line."""
-SHOWN = 12
-"""Names of columns that a message lists."""
-COMMENT = ("#", "%", "!", "//")
 HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "ghz": 1e9}
 _ANGLE = re.compile(r"(angle|azimuth|phi|elev|theta|aspect|incidence|deg|(?<![a-z])(az|el)(?![a-z]))")
-_POLAR = re.compile(r"(elev|theta|(?<![a-z])el(?![a-z]))")
-_AREA = re.compile(r"(m2|m\^2|sqm|sigma|linear)")
 _OTHER = re.compile(r"(phase|error|uncertain|unresolved|method|(?<![a-z])(re|im)(?![a-z]))")
-_RADIANS = re.compile(r"(?<![a-z])rad(ian)?s?(?![a-z])")
 _POLARISATION = re.compile(r"(?<![a-z])(hh|vv|hv|vh)(?![a-z])")
 
 
@@ -94,14 +86,14 @@ def read_cut(path: str | os.PathLike[str]) -> MeasuredCut:
         if column == at or _OTHER.search(lower) or _is_frequency(lower) or (_ANGLE.search(lower) and not _level(lower)):
             continue
         values = numbers[:, column]
-        if _AREA.search(lower) and "db" not in lower:
+        if re.search(r"(m2|m\^2|sqm|sigma|linear)", lower) and "db" not in lower:
             with np.errstate(divide="ignore", invalid="ignore"):
                 values = 10 * np.log10(values)
         levels[name] = values
     if not levels:
         raise InvalidInputError(f"{file} has no column of levels; its columns are {_listed(names)}")
     order = np.argsort(numbers[:, at], kind="stable")
-    polar = over == "angle" and bool(_POLAR.search(names[at].lower()))
+    polar = over == "angle" and bool(re.search(r"(elev|theta|(?<![a-z])el(?![a-z]))", names[at].lower()))
     found = {name: v[order] for name, v in levels.items()}
     return MeasuredCut(file.name, over, scale * numbers[order, at], found, polar)
 
@@ -112,7 +104,7 @@ def _table(file: Path) -> tuple[list[str], FloatArray]:
     # a list of lists would take ten times the memory
     numbers, rows, columns, bare = array("d"), 0, 0, False
     for number, line in lines_of(file, MOST_BYTES, LONGEST):
-        comment = line.startswith(COMMENT)
+        comment = line.startswith(("#", "%", "!", "//"))
         cells = _cells(line.lstrip("#%!/ ") if comment else line)
         values = [_number(cell) for cell in cells]
         if comment or not any(value is not None for value in values):
@@ -121,8 +113,8 @@ def _table(file: Path) -> tuple[list[str], FloatArray]:
             if not rows:
                 headers.append(cells)
                 bare |= not comment
-                if len(headers) > MOST_HEADERS:
-                    raise InvalidInputError(f"{file}, line {number}: more than {MOST_HEADERS} lines above the numbers")
+                if len(headers) > 10_000:
+                    raise InvalidInputError(f"{file}, line {number}: more than 10000 lines above the numbers")
             continue
         if rows and len(values) != columns:
             raise InvalidInputError(f"{file}, line {number}: {len(values)} columns where {columns} were before")
@@ -164,9 +156,9 @@ def lines_of(file: Path, most_bytes: int, longest: int) -> Iterator[tuple[int, s
 
 
 def _listed(names: list[str]) -> str:
-    """Names as a message has them: the first ones, each cut if long."""
-    more = f", and {len(names) - SHOWN} more" * (len(names) > SHOWN)
-    return ", ".join(name[:40] for name in names[:SHOWN]) + more
+    """Names as a message has them: the first twelve, each cut if long."""
+    more = f", and {len(names) - 12} more" * (len(names) > 12)
+    return ", ".join(name[:40] for name in names[:12]) + more
 
 
 def _cells(line: str) -> list[str]:
@@ -195,7 +187,9 @@ def _abscissa(file: Path, names: list[str], numbers: FloatArray) -> tuple[int, s
             unit = next((unit for unit in ("ghz", "mhz", "khz") if unit in name), "hz")
             found.append((column, "frequency", HERTZ[unit]))
         elif _ANGLE.search(name) and not _level(name):
-            found.append((column, "angle", float(np.degrees(1.0)) if _RADIANS.search(name) else 1.0))
+            found.append(
+                (column, "angle", float(np.degrees(1.0)) if re.search(r"(?<![a-z])rad(ian)?s?(?![a-z])", name) else 1.0)
+            )
     varied = [one for one in found if len(np.unique(numbers[:, one[0]])) > 1]
     if len(varied) > 1:
         raise InvalidInputError(f"{file} varies {' and '.join(names[one[0]] for one in varied)}; give a cut of one")

@@ -34,11 +34,6 @@ from creeping.shadow.line import ShadowLine
 
 INCIDENT = ("d", "S")
 """Names of the arrow of the wave."""
-NAMES_APART = 0.5
-"""Least distance of the names of two axes, in lengths of an axis."""
-NEAR_SOURCE, SIDEWAYS, STEEP = 2.5, 75.0, 55.0
-"""Distance from all of the body, in body sizes, within which a source is in the picture; degrees by which the camera
-stands aside of its wave, so that the source and its shadow both show, and above or below a body that hides it."""
 
 
 @dataclass(frozen=True)
@@ -216,7 +211,8 @@ class Drawing:
         extent = float(np.max(high - low))
         if self.source is not None:
             away = np.linalg.norm(self.mesh.vertices - self.source, axis=1)
-            if np.max(away) < NEAR_SOURCE * size(self.body):
+            # farther away it is not in the picture
+            if np.max(away) < 2.5 * size(self.body):
                 long = min(0.38 * extent, 0.8 * float(np.min(away)))
                 return Mark("S", self.source, self.source + long * self.direction)
         along = 0.38 * extent * self.direction
@@ -237,7 +233,8 @@ class Drawing:
             low[1] + 0.03 * extent - min(0.0, float(flat[:, 1].min())),
         )
         marks = [Mark(name, foot, foot + length * unit) for name, unit in zip("xyz", np.eye(3), strict=True)]
-        return _apart(marks, self.view, NAMES_APART * length)
+        # names of two axes stand half an axis apart at least
+        return _apart(marks, self.view, 0.5 * length)
 
     @property
     def marks(self) -> list[Mark]:
@@ -276,8 +273,9 @@ class Drawing:
 
 def _source_view(body: Surface, source: FloatArray, towards: FloatArray) -> View:
     """Camera aside of the wave of a point source, raised or lowered where the body would hide the source."""
-    first = shadow_view(towards, turned=np.radians(SIDEWAYS))
-    tried = [first, *(View(first.azimuth, np.radians(e)) for e in (STEEP, -STEEP))]
+    # so far aside that the source and its shadow both show
+    first = shadow_view(towards, turned=np.radians(75.0))
+    tried = [first, *(View(first.azimuth, np.radians(e)) for e in (55.0, -55.0))]
     return next((view for view in tried if view.visible(body, source[None])[0]), first)
 
 

@@ -33,11 +33,8 @@ FADED, FADED_WIDTH = 0.4, 0.5
 HIDDEN = 0.22  # share of its ink that a line behind the body keeps
 # apart in lightness as well as in hue, and apart from the map of the iso-phase levels
 STATUS_COLOURS = {"attached": "#111111", "occluded": "#e8890c", "concave": "#d6409f"}
-FADES, CROSSED = (10.0, 20.0, 30.0), 2
-"""Decibels by which the wave of a ray has fallen where it is drawn paler and at last no more, and zeros of J that it
-passes at most."""
-PALER = (1.0, 0.6, 0.35)
-"""Opacity of rays between these."""
+FADES = (10.0, 20.0, 30.0)
+"""Decibels by which the wave of a ray has fallen where it is drawn paler and at last no more."""
 LEVEL_NAMES = {"travel_time": "travel time", "eikonal": "eikonal"}
 
 
@@ -135,7 +132,8 @@ def drawn_ends(
         return np.zeros((len(FADES), 0))
     if until is not None:
         return np.full((len(FADES), len(fan.points)), float(until))
-    crossed = np.asarray(fan.caustic_index) >= CROSSED
+    # a ray ends where J has its second zero
+    crossed = np.asarray(fan.caustic_index) >= 2
     times = np.asarray(fan.travel_time)
     ends = np.where(crossed.any(axis=1), times[np.argmax(crossed, axis=1)], np.inf)
     if speed_of(fan.body) is not None or not len(ends):
@@ -225,7 +223,7 @@ def ray_strokes(fan: RayFan, rays: int, ends: FloatArray, *, spacing: float = 0.
             begin = end
     found = [Stroke(free, RAY_COLOUR, 0.5, alpha=0.5, label="ray after detachment")] if free else []
     # the strongest part stands in the legend
-    for part, alpha in reversed([pair for pair in zip(bound, PALER, strict=True) if pair[0]]):
+    for part, alpha in reversed([pair for pair in zip(bound, (1.0, 0.6, 0.35), strict=True) if pair[0]]):
         found.append(Stroke(part, RAY_COLOUR, 0.6, alpha=alpha, label="creeping ray" if alpha == 1 else ""))
     return found
 

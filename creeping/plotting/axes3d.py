@@ -68,12 +68,18 @@ def plot_rays_3d(
 
 def draw(ax: Any, drawing: Drawing) -> None:
     """Draw a composed picture on 3-D axes, without legend."""
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
     # the order of drawing is ours: the body, hidden lines, visible lines by rank, arrows
     ax.computed_zorder = False
     _draw_body(ax, drawing)
     for stroke in drawing.strokes:
         _draw_stroke(ax, drawing, stroke)
-    _draw_marks(ax, drawing)
+    # not quiver: its heads are flat in space and vanish when seen from the side
+    outlines = [mark.outline(drawing.view) for mark in drawing.marks]
+    ax.add_collection3d(Poly3DCollection(outlines, facecolors=ARROW_COLOUR, linewidths=0, zorder=30))
+    for mark in drawing.marks:
+        ax.text(*mark.label(drawing.view), mark.name, zorder=30, **mark.text)
     # 3-D axes are square; a wide body may use all of the place they were given
     for artist in ax.collections:
         artist.set_clip_on(False)
@@ -129,18 +135,6 @@ def _draw_stroke(ax: Any, drawing: Drawing, stroke: Stroke) -> None:
                 zorder=2 + stroke.rank + above,
             )
             ax.add_collection3d(lines)
-
-
-def _draw_marks(ax: Any, drawing: Drawing) -> None:
-    """Draw the arrow of incidence and the triad of the coordinate axes."""
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-    marks = drawing.marks
-    # not quiver: its heads are flat in space and vanish when seen from the side
-    outlines = [mark.outline(drawing.view) for mark in marks]
-    ax.add_collection3d(Poly3DCollection(outlines, facecolors=ARROW_COLOUR, linewidths=0, zorder=30))
-    for mark in marks:
-        ax.text(*mark.label(drawing.view), mark.name, zorder=30, **mark.text)
 
 
 def _frame(ax: Any, drawing: Drawing) -> None:

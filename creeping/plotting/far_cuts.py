@@ -22,20 +22,16 @@ from creeping.plotting._cut_angles import CutAngles, cut_angles
 if TYPE_CHECKING:
     from creeping.field.far_result import FarField
 
-ABOVE, NARROW = 10.0, 10.0
-"""Room for bands over the curves, dB, and range up to which an axis ends at whole decibels rather than fives."""
-KINDS = ("cartesian", "polar")
+ABOVE = 10.0
+"""Room for bands over the curves, dB."""
 QUANTITIES = {
     "amplitude": ("20 log$_{10}$|f| (dB re 1 %s)", decibels),
     "rcs": ("4π|f|$^2$ (dB re 1 %s$^2$)", cross_section_decibels),
 }
 COMPONENTS = {"tt": (0, 0), "tp": (0, 1), "pt": (1, 0), "pp": (1, 1)}
 """Scattered by incident component of a vector field: t is θ̂, p is φ̂."""
-_GREEK, _RADAR = str.maketrans("tp", "θφ"), str.maketrans("tp", "VH")
 PARTS = {"creeping": "--", "reflected": "-.", "forward": ":", "dark": "--", "lit": "-."}
 """Line of each part of a far field."""
-HATCHED: dict[str, Any] = {"facecolor": "none", "edgecolor": "#b4b9bd", "hatch": "////", "linewidth": 0, "zorder": 0.2}
-"""Of angles at which a field is unresolved."""
 
 
 @dataclass(frozen=True)
@@ -119,8 +115,8 @@ def far_cut_picture(
     CreepingError
         If the file cannot be written.
     """
-    if kind not in KINDS:
-        raise InvalidInputError(f"kind {kind!r} is unknown; give {' or '.join(KINDS)}")
+    if kind not in ("cartesian", "polar"):
+        raise InvalidInputError(f"kind {kind!r} is unknown; give cartesian or polar")
     angle = checked_angles(angles)
     curves = cut_curves(len(angle), fields, quantity=quantity, exact=exact, parts=parts, components=components)
     heights = heights_of(curves, span)
@@ -152,7 +148,8 @@ def heights_of(curves: Sequence[Curve], span: float) -> tuple[float, float]:
         ends += [np.maximum(np.quantile(below, [0.05]), top - span)] if len(below) else []
         ends += [np.minimum(np.quantile(above, [0.95]), top + ABOVE)] if len(above) else []
     low, high = shown_range([*levels, *ends], span + ABOVE)
-    if high - low <= NARROW:
+    # a narrow axis ends at whole decibels rather than fives
+    if high - low <= 10.0:
         low, high = shown_range([*levels, *ends], span + ABOVE, step=1.0)
     return max(low, top - span), high
 
@@ -207,10 +204,11 @@ def _hatch(ax: Any, angle: FloatArray, curves: Sequence[Curve]) -> None:
     middles = 0.5 * (across[1:] + across[:-1])
     starts, ends = np.append(across[:1], middles), np.append(middles, across[-1:])
     edges = np.flatnonzero(np.diff(np.concatenate([[0], doubtful.astype(int), [0]])))
+    look: dict[str, Any] = {"facecolor": "none", "edgecolor": "#b4b9bd", "hatch": "////", "linewidth": 0, "zorder": 0.2}
     label = "unresolved"
     for first, after in edges.reshape(-1, 2):
         span = sorted((starts[first], ends[after - 1]))
-        ax.axvspan(*span, label=label, **HATCHED)
+        ax.axvspan(*span, label=label, **look)
         label = "_one entry is enough"
 
 
@@ -305,7 +303,8 @@ def component_name(name: str) -> str:
     >>> component_name("tt"), component_name("pt")
     ('θθ (VV)', 'φθ (HV)')
     """
-    return name.translate(_GREEK) + f" ({name.translate(_RADAR)})"
+    greek, radar = (name.translate(str.maketrans("tp", letters)) for letters in ("θφ", "VH"))
+    return f"{greek} ({radar})"
 
 
 def _levels(values: ComplexArray, quantity: str) -> FloatArray:

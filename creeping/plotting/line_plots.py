@@ -25,8 +25,6 @@ from creeping.shadow.curve import ShadowCurve
 from creeping.shadow.line import ShadowLine
 from creeping.shadow.status import STATUSES
 
-KINDS = ("parameters", "3d")
-
 
 def line_of(curve: ShadowCurve) -> ShadowLine:
     """Shadow line that consists of one curve, for pictures: how far it is from crossing itself is not known."""
@@ -92,16 +90,6 @@ def plot_line(
         title = rays_caption(line, fan, RayLook(**shown))
         ax.set_title(title, fontsize=TITLE_SIZE, loc="left", parse_math=False)
     return ax
-
-
-def plot_shadow_curve(curve: ShadowCurve, ax: Any = None, **options: Any) -> Any:
-    """Draw one curve of a shadow line; options as for `plot_line`."""
-    return plot_line(line_of(curve), ax, **options)
-
-
-def plot_fan(fan: RayFan, ax: Any = None, **options: Any) -> Any:
-    """Draw a fan and its shadow line; options as for `plot_line`."""
-    return plot_line(fan.line, ax, fan=fan, **options)
 
 
 def plot_curve(curve: IsoPhaseCurve, ax: Any = None, *, kind: str | None = None, legend: bool | None = None) -> Any:
@@ -191,8 +179,8 @@ def plot_growth(flow: PhaseMap, ax: Any = None, *, tolerance: float | None = Non
 
 def _in_space(ax: Any, kind: str | None) -> bool:
     """Whether to draw in space."""
-    if kind is not None and kind not in KINDS:
-        raise InvalidInputError(f"kind {kind!r} is unknown; give {' or '.join(KINDS)}")
+    if kind is not None and kind not in ("parameters", "3d"):
+        raise InvalidInputError(f"kind {kind!r} is unknown; give parameters or 3d")
     space = kind == "3d"
     if ax is None:
         return space

@@ -8,18 +8,18 @@ import numpy as np
 
 from creeping._typing import Any
 from creeping.errors import InvalidInputError
+from creeping.plotting import axes3d
 from creeping.plotting._drawing import Drawing, View, compose
 from creeping.plotting._strokes import ARROW_COLOUR, RayOptions
 from creeping.plotting.pages import new_figure, save_figure
-from creeping.plotting.scene import gl_available
+from creeping.plotting.scene import gl_available, render
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowLine
 
-BACKENDS = ("auto", "pyvista", "matplotlib")
 WIDTH = 6.4  # inches
-TITLE, TITLE_SIZE = 0.16, 8.0
-"""Height of a line of the title, inches, and its letters, points."""
+TITLE_SIZE = 8.0
+"""Of the letters of a title, points."""
 FINER = 1.6
 """Pixels of what OpenGL renders for each of the file, along a side."""
 Place = tuple[float, float, float, float]  # left, bottom, width, height, as shares of the figure
@@ -94,8 +94,8 @@ def chosen_backend(backend: str) -> str:
     InvalidInputError
         If the backend is not one of the three.
     """
-    if backend not in BACKENDS:
-        raise InvalidInputError(f"backend {backend!r} is unknown; give one of {', '.join(BACKENDS)}")
+    if backend not in ("auto", "pyvista", "matplotlib"):
+        raise InvalidInputError(f"backend {backend!r} is unknown; give one of auto, pyvista, matplotlib")
     if backend == "auto":
         return "pyvista" if gl_available().ok else "matplotlib"
     return backend
@@ -104,8 +104,12 @@ def chosen_backend(backend: str) -> str:
 def drawn_page(drawing: Drawing, backend: str, dpi: int) -> tuple[Any, Place]:
     """Figure with the body's picture and room for a legend, and the place of a colour bar."""
     figure, place = _page(drawing)
-    draw = _draw_pyvista if backend == "pyvista" else _draw_matplotlib
-    draw(figure, place, drawing, dpi)
+    if backend == "pyvista":
+        _draw_pyvista(figure, place, drawing, dpi)
+    else:
+        from creeping.plotting._inline import InlineAxes3D
+
+        axes3d.draw(figure.add_axes(place, axes_class=InlineAxes3D), drawing)
     figure.text(0.02, 0.99, drawing.title, fontsize=TITLE_SIZE, va="top", parse_math=False)
     left, bottom, width, height = place
     return figure, (left + width + 0.02, bottom + 0.12 * height, 0.022, 0.76 * height)
@@ -119,26 +123,17 @@ def _page(drawing: Drawing) -> tuple[Any, Place]:
     body = float(np.clip(width * (high[1] - low[1]) / (high[0] - low[0]), 2.4, 4.6))
     legend = 0.55 if len({stroke.label for stroke in drawing.strokes} - {""}) > 3 else 0.38
     lines = drawing.title.count("\n") + 1 if drawing.title else 0
-    height = body + legend + 0.05 + TITLE * lines
+    height = body + legend + 0.05 + 0.16 * lines
     return new_figure((WIDTH, height)), (0.01, legend / height, width / WIDTH, body / height)
-
-
-def _draw_matplotlib(figure: Any, place: Place, drawing: Drawing, dpi: int) -> None:
-    from creeping.plotting import axes3d
-    from creeping.plotting._inline import InlineAxes3D
-
-    axes3d.draw(figure.add_axes(place, axes_class=InlineAxes3D), drawing)
 
 
 def _draw_pyvista(figure: Any, place: Place, drawing: Drawing, dpi: int) -> None:
     """Render the scene without any text, which matplotlib then sets, sharper and as in the other backend."""
-    from creeping.plotting import scene
-
     ax = figure.add_axes(place)
     # more pixels than the file has: reduced on saving, which smooths every edge
     inches = figure.get_size_inches()
     width, height = (round(FINER * dpi * float(size) * share) for size, share in zip(inches, place[2:], strict=True))
-    image = scene.render(drawing, (width, height), scale=FINER * dpi / 72)
+    image = render(drawing, (width, height), scale=FINER * dpi / 72)
     low, high = drawing.frame
     middle = 0.5 * (low + high)
     half_height = max(0.5 * float(high[1] - low[1]), 0.5 * float(high[0] - low[0]) * height / width)

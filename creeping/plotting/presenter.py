@@ -5,9 +5,9 @@ show one result does not import the modules of all others.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -41,66 +41,65 @@ Facts = Iterable[tuple[str, str]]
 
 def html(result: object) -> str:
     """Table of a result: no script, no style sheet, nothing from elsewhere."""
-    facts: dict[str, Callable[..., Facts]] = {
-        "ShadowLine": of_line,
-        "ShadowCurve": of_shadow_curve,
-        "RayFan": of_fan,
-        "IsoPhaseCurve": of_curve,
-        "FarField": of_far,
-        "PointData": of_points,
-        "FieldCut": of_cut,
-        "PhaseMap": of_map,
-        "DirectFlow": of_direct,
-        "Coupling": of_coupling,
-        "SourcePattern": of_pattern,
-        "ImpulseResponse": of_impulse,
-        "RangeProfile": of_profile,
-        "Echo": of_echo,
-    }
     left = ' style="text-align:left"'
     rows = "".join(
         f'<tr><th scope="row"{left}>{escape(name)}</th><td{left}>{escape(value)}</td></tr>'
-        for name, value in _of(result, facts)(result)
+        for name, value in _shown(result, "facts")(result)
     )
     return f"<table><caption{left}>{escape(type(result).__name__)}</caption><tbody>{rows}</tbody></table>"
 
 
 def plot(result: object, ax: Any = None, **options: Any) -> Any:
     """Matplotlib axes with the picture of a result; options are those of its ``plot_*`` function."""
-    plots: dict[str, Callable[..., Any]] = {
-        "ShadowLine": line_plots.plot_line,
-        "ShadowCurve": line_plots.plot_shadow_curve,
-        "RayFan": line_plots.plot_fan,
-        "IsoPhaseCurve": line_plots.plot_curve,
-        "FarField": far_cuts.plot_far,
-        "FieldCut": plane_pictures.plot_field_cut,
-        "PhaseMap": line_plots.plot_growth,
-        "Coupling": coupling_pictures.plot_coupling,
-        "SourcePattern": coupling_pictures.plot_pattern,
-        "ImpulseResponse": echo_pictures.plot_impulse,
-        "RangeProfile": echo_pictures.plot_profile,
-        "Echo": echo_pictures.plot_echo,
-    }
-    return _of(result, plots)(result, ax, **options)
+    return _shown(result, "plot")(result, ax, **options)
 
 
 def to_polydata(result: object) -> Any:
     """Curves of a result as a ``pyvista.PolyData``."""
-    makers: dict[str, Callable[[Any], Any]] = {
-        "ShadowLine": polydata,
-        "ShadowCurve": lambda curve: polydata(line_plots.line_of(curve)),
-        "RayFan": lambda fan: polydata(fan=fan),
-        "IsoPhaseCurve": lambda curve: polydata(curves=[curve]),
+    return _shown(result, "polydata")(result)
+
+
+class Ways(NamedTuple):
+    """How a type shows itself; None where it does not."""
+
+    facts: Callable[..., Facts]
+    plot: Callable[..., Any] | None = None
+    polydata: Callable[[Any], Any] | None = None
+
+
+def _shown(result: object, way: str) -> Callable[..., Any]:
+    """One way of the result's class, or of the nearest one that it is derived from."""
+    ways = {
+        "ShadowLine": Ways(of_line, line_plots.plot_line, polydata),
+        "ShadowCurve": Ways(
+            of_shadow_curve,
+            lambda curve, ax, **shown: line_plots.plot_line(line_plots.line_of(curve), ax, **shown),
+            lambda curve: polydata(line_plots.line_of(curve)),
+        ),
+        "RayFan": Ways(
+            of_fan,
+            lambda fan, ax, **shown: line_plots.plot_line(fan.line, ax, fan=fan, **shown),
+            lambda fan: polydata(fan=fan),
+        ),
+        "IsoPhaseCurve": Ways(of_curve, line_plots.plot_curve, lambda curve: polydata(curves=[curve])),
+        "FarField": Ways(of_far, far_cuts.plot_far),
+        "PointData": Ways(of_points),
+        "FieldCut": Ways(of_cut, plane_pictures.plot_field_cut),
+        "PhaseMap": Ways(of_map, line_plots.plot_growth),
+        "DirectFlow": Ways(of_direct),
+        "Coupling": Ways(of_coupling, coupling_pictures.plot_coupling),
+        "SourcePattern": Ways(of_pattern, coupling_pictures.plot_pattern),
+        "ImpulseResponse": Ways(of_impulse, echo_pictures.plot_impulse),
+        "RangeProfile": Ways(of_profile, echo_pictures.plot_profile),
+        "Echo": Ways(of_echo, echo_pictures.plot_echo),
     }
-    return _of(result, makers)(result)
-
-
-def _of(result: object, table: Mapping[str, Callable[..., Any]]) -> Callable[..., Any]:
-    """Entry of the result's class, or of the nearest one that it is derived from."""
+    known: dict[str, Callable[..., Any]] = {
+        name: one for name, row in ways.items() if (one := getattr(row, way)) is not None
+    }
     for kind in type(result).__mro__:
-        if kind.__name__ in table:
-            return table[kind.__name__]
-    raise InvalidInputError(f"a {type(result).__name__} cannot be shown so; only {', '.join(table)} can")
+        if kind.__name__ in known:
+            return known[kind.__name__]
+    raise InvalidInputError(f"a {type(result).__name__} cannot be shown so; only {', '.join(known)} can")
 
 
 def of_line(line: "ShadowLine") -> Facts:
