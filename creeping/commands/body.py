@@ -6,7 +6,7 @@ Also here: the flow that carries its rays, and the tables that commands write.
 import inspect
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -139,23 +139,24 @@ def _like_expression(text: str) -> bool:
     return bool(re.search(r"[-+*/(]", text) and re.search(r"(?<![A-Za-z_])[xyz](?![A-Za-z_])", text))
 
 
-def table_formats(text: str) -> tuple[str, ...]:
-    """Kinds of tables that are asked for.
+def each_once(option: str, text: str, known: Collection[str]) -> tuple[str, ...]:
+    """Names that an option gives, joined by commas, in capitals or not.
 
     Raises
     ------
     InvalidInputError
-        If one is unknown, or given twice.
+        If one is not known, or given twice.
 
     Examples
     --------
-    >>> table_formats("csv, mat")
+    >>> each_once("--format", "csv, MAT", ("csv", "mat"))
     ('csv', 'mat')
     """
-    names = tuple(name.strip().lower() for name in text.split(","))
-    if not {"csv", "mat"} >= set(names) or len(set(names)) < len(names):
-        raise InvalidInputError(f"--format {text!r}: give some of csv, mat, each once")
-    return names
+    spelled = {name.lower(): name for name in known}
+    given = [name.strip().lower() for name in text.split(",")]
+    if not set(given) <= set(spelled) or len(set(given)) < len(given):
+        raise InvalidInputError(f"{option} {text!r}: give some of {', '.join(known)}, each once")
+    return tuple(spelled[name] for name in given)
 
 
 @dataclass(frozen=True)

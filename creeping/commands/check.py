@@ -43,11 +43,10 @@ def check(
         raise InvalidInputError(f"--wavenumber {wavenumber!r} is not a positive finite number")
     asked: dict[str, Any] = {}
     if any(value is not None for value in (wavenumber, frequency, wavelength, sound_speed)):
-        from creeping.commands.wave import asked_wavenumber, cure_of
+        from creeping.commands.wave import asked_wavenumber
 
-        option, text = ("--frequency", frequency or wavelength) if wavenumber is None else ("--wavenumber", wavenumber)
-        wavenumber, hertz = asked_wavenumber(wavenumber, frequency, wavelength, sound_speed)
-        asked = {"metres": hertz is not None, "cure": cure_of(option, text, hertz)}
+        wavenumber, hertz, cure = asked_wavenumber(wavenumber, frequency, wavelength, sound_speed)
+        asked = {"metres": hertz is not None, "cure": cure}
     mesh = is_file(body) and Path(body).suffix.lower() not in CAD
     if wavenumber is not None and speed is not None:
         raise InvalidInputError("--wavenumber is for rays of constant speed; leave out one of --speed and --wavenumber")

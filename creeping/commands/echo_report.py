@@ -14,7 +14,7 @@ from creeping import plotting
 from creeping._progress import Progress
 from creeping._typing import FloatArray
 from creeping._version import __version__
-from creeping.commands.body import parse_body, table_formats
+from creeping.commands.body import each_once, parse_body
 from creeping.commands.echo_request import EchoRequest, echo_request, radians_hint
 from creeping.commands.forecast import boundary_words, forecast
 from creeping.commands.options import EchoOptions, FileOptions
@@ -47,7 +47,7 @@ def run_echo(quantity: str, body: str, given: EchoOptions, file: FileOptions, **
     boundary, mono, k = parse_boundary(request.boundary), request.monostatic, request.wavenumbers
     words = asked | {"method": method} | file.given() | {"pictures": given.pictures, "formats": given.formats}
     words |= {"compare": given.compare, "column": given.column, "align": given.align}
-    formats = table_formats(given.formats)
+    formats = each_once("--format", given.formats, ("csv", "mat"))
     # before the time is spent
     reference = reference_of(request, given.compare, given.column, given.align)
     with Progress(quiet=given.json_) as progress:
@@ -106,7 +106,6 @@ def run_echo(quantity: str, body: str, given: EchoOptions, file: FileOptions, **
             summary = summary_of(body, request, echo, dataset) | extra | refused
             summary["files"] = [*names, SUMMARY]
             unfinished.write_summary(summary, complete=True)
-            unfinished.finished()
     summary |= {"complete": True, "seconds": round(time.perf_counter() - started, 2)}
     print(json.dumps(summary, indent=1) if given.json_ else readable(summary, output))
     return 0

@@ -21,7 +21,7 @@ from creeping.commands import explore as _explore_command
 from creeping.commands import options, resuming
 from creeping.commands import sweep as _sweep_command
 from creeping.commands import upkeep as _upkeep
-from creeping.commands.body import Output, flow_of, parse_body, table_formats, title_of
+from creeping.commands.body import Output, each_once, flow_of, parse_body, title_of
 
 app = App(
     name="creeping",
@@ -185,7 +185,7 @@ def run(
     from creeping.rays.reach import ray_length
 
     started = time.perf_counter()
-    written = Output(output, title_of(body), table_formats(formats), pictures, backend)
+    written = Output(output, title_of(body), each_once("--format", formats, ("csv", "mat")), pictures, backend)
     for name, value in (("length", length), ("spacing", spacing)):
         if isinstance(value, float) and not (np.isfinite(value) and value > 0):
             raise cr.CreepingError(f"--{name} {value!r} is not a positive finite number")
@@ -246,7 +246,6 @@ def run(
                 summary["files"][-1:-1] = names
             summary["seconds"] = round(time.perf_counter() - started, 2)
             unfinished.write_summary(summary, complete=True)
-            unfinished.finished()
     print(json.dumps(summary, indent=1) if json_ else _run_results.readable(summary, output))
     return 0
 

@@ -87,15 +87,13 @@ class Unfinished:
             self._shown = time.monotonic()
 
     def write_summary(self, summary: dict[str, Any], *, complete: bool) -> None:
-        """Write the summary file, without the seconds, which are those of one run."""
+        """Write the summary file, without the seconds, which are those of one run; the parts go when all is written."""
         from creeping.files import write_text
 
         text = json.dumps({"complete": complete, **_timeless(summary), "asked": self.asked}, indent=1)
         write_text(self.output / SUMMARY, text + "\n")
-
-    def finished(self) -> None:
-        """Remove the parts: all files are written."""
-        shutil.rmtree(self.parts, ignore_errors=True)
+        if complete:
+            shutil.rmtree(self.parts, ignore_errors=True)
 
 
 def make_folder(folder: Path, asked: Path | None = None) -> None:

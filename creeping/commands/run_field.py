@@ -9,10 +9,10 @@ import numpy as np
 
 from creeping import files, plotting
 from creeping._typing import ArrayLike, FloatArray
-from creeping.commands.body import Output, write_tables
+from creeping.commands.body import Output, each_once, write_tables
 from creeping.commands.forecast import Forecast, forecast, radar_of
 from creeping.commands.resuming import Unfinished
-from creeping.commands.wave import asked_wavenumber, cure_of, frequency_words
+from creeping.commands.wave import asked_wavenumber, frequency_words
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.body_currents import cached_currents
 from creeping.field.boundary import BoundaryLike, parse_boundary
@@ -331,7 +331,7 @@ def job(
         raise InvalidInputError("--wavenumber is for rays of constant speed; leave out --speed, or the field")
     if direction is None:
         raise InvalidInputError(f"the field of --wavenumber is that of a plane wave; --source is {REMEDY}")
-    k, hertz = asked_wavenumber(wavenumber, frequency, wavelength, sound_speed)
+    k, hertz, cure = asked_wavenumber(wavenumber, frequency, wavelength, sound_speed)
     d = unit_direction(direction)
     # the cut through the direction of the wave; of one along z that of phi = 0
     azimuth = 0.0 if np.hypot(d[0], d[1]) < 1e-9 else np.degrees(np.arctan2(d[1], d[0]))
@@ -340,23 +340,13 @@ def job(
         raise InvalidInputError("--observe names several grids; give one, far.ffe holds no more")
     kind = _boundary(boundary or "soft")
     unit = "m" if wavenumber is None else None
-    names = ("--wavenumber", "--frequency", "--wavelength")
-    option, text = next(one for one in zip(names, given, strict=True) if one[1] is not None)
-    found = Job(k, kind, targets, unit, hertz, _components(polarisation, kind), cure_of(option, text, hertz))
+    if polarisation is not None and kind != "pec":
+        raise InvalidInputError("--polarisation is of a conductor; give it with --boundary pec")
+    shown = each_once("--polarisation", polarisation or "VV,HH", POLARISATIONS)
+    components = tuple(POLARISATIONS[name] for name in shown)
+    found = Job(k, kind, targets, unit, hertz, components, cure)
     found.check_count()
     return found
-
-
-def _components(polarisation: str | None, boundary: BoundaryLike) -> tuple[str, ...]:
-    """Components that pictures show."""
-    if polarisation is None:
-        return ("tt", "pp")
-    names = [name.strip().upper() for name in polarisation.split(",")]
-    if boundary != "pec":
-        raise InvalidInputError("--polarisation is of a conductor; give it with --boundary pec")
-    if not set(names) <= set(POLARISATIONS) or len(set(names)) < len(names):
-        raise InvalidInputError(f"--polarisation {polarisation!r}: give some of {', '.join(POLARISATIONS)}, each once")
-    return tuple(POLARISATIONS[name] for name in names)
 
 
 def _boundary(text: str) -> BoundaryLike:

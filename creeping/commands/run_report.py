@@ -192,7 +192,6 @@ def run_solved(
         summary["field"]["seconds"], summary["files"] = seconds, [*names, "summary.json"]
         summary["seconds"] = round(time.perf_counter() - started, 2)
         unfinished.write_summary(summary, complete=True)
-        unfinished.finished()
     return summary
 
 

@@ -89,22 +89,17 @@ def coupling_picture(
         drawing = with_fronts(drawing, field, phase)
     unit = power(field.length_unit, -1)
     label = f"20 log$_{{10}}$|u| (dB re 1 {unit})\nk = {field.wavenumber:g}/{field.length_unit}, {field.boundary}"
-    levels = coupling_levels(field)
-    return save_painted(path, drawing, levels, span=span, label=label, bare=_bare(field), backend=backend, dpi=dpi)
+    finite = np.isfinite(field.values)
+    counts = {s.name: int(np.sum((field.status == s) & finite)) for s in FieldStatus if s != FieldStatus.OK}
+    shares = (f"{100 * count / field.size:.2g} % {name}" for name, count in counts.items() if count)
+    look: dict[str, Any] = {"bare": "not OK: " + (", ".join(shares) or "none"), "backend": backend, "dpi": dpi}
+    return save_painted(path, drawing, coupling_levels(field), span=span, label=label, **look)
 
 
 def coupling_levels(field: PortField) -> FloatArray:
     """20 log10 |u| of a field of a source on the body (...), NaN where its status is not OK, inf at the source."""
     at_source = ~np.isfinite(field.values)
     return np.where(field.ok | at_source, decibels(field.values), np.nan)
-
-
-def _bare(field: PortField) -> str:
-    """What is grey, by status."""
-    finite = np.isfinite(field.values)
-    counts = {s.name: int(np.sum((field.status == s) & finite)) for s in FieldStatus if s != FieldStatus.OK}
-    share = {name: 100 * count / field.size for name, count in counts.items() if count}
-    return "not OK: " + (", ".join(f"{value:.2g} % {name}" for name, value in share.items()) or "none")
 
 
 def _ring(body: Surface, point: FloatArray, n: FloatArray) -> FloatArray:
