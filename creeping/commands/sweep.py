@@ -146,6 +146,7 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Prog
 
 
 def _flow(read: Any, body: Any, request: Any, cache: bool, progress: Any) -> Any:
+    from creeping import build_phase_map
     from creeping.geometry.parts import why_no_rays
     from creeping.sweeping.solved_fields import NoFlow
     from creeping.sweeping.sweeper import outputs_of
@@ -153,7 +154,11 @@ def _flow(read: Any, body: Any, request: Any, cache: bool, progress: Any) -> Any
     if why_no_rays(body):
         return NoFlow(body)
     asked = {"length": request.length, "n_steps": outputs_of(body, request), "cache": cache, "progress": progress}
-    return flow_of(read.flow, body, read.tolerance, n_rays=len(read.incidences) * request.n_rays, **asked)
+    rays = len(read.incidences) * request.n_rays
+    if read.flow == "map":
+        # tuned for all rays of the sweep
+        return build_phase_map(body, tolerance=read.tolerance, n_rays=rays, **asked)
+    return flow_of(read.flow, body, read.tolerance, n_rays=rays, **asked)
 
 
 def _run(plan: Any, store: Any, scheduler: str | None, workers: int | None, meter: Progress) -> tuple[bool, int]:
