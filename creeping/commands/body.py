@@ -1,18 +1,17 @@
 """The BODY of a command: a name with parameters, a file, or an expression. Part of the command line.
 
-Also here: kinds of tables that a command writes, ``--format``, and the writing of them.
+Also here: the flow that carries its rays, and the tables that commands write.
 """
 
 import inspect
 import os
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-from cyclopts import Parameter
-
+from creeping.commands.options import AS_IT_IS, FileOptions
 from creeping.errors import InvalidInputError, near_names
 
 BODIES = {
@@ -30,63 +29,8 @@ BODIES = {
 }
 MESHES = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf", ".msh", ".bdf", ".nas", ".mesh", ".gz")
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
-FILE_OPTIONS = ("units", "strict", "part", "cap", "union")
-FORMATS = ("csv", "mat")
-HELP = "Tables: csv or mat (MATLAB), or both joined by a comma."
 
-
-Progress = Callable[[str], None]
-
-Body = Annotated[
-    str,
-    Parameter(
-        help="Name with parameters, e.g. torus or ellipsoid:a=1.2,b=0.8,c=0.8; a file, e.g. hull.stl or hull.step; "
-        "or an expression F(x, y, z), negative inside, or an equation, e.g. 'x**2 + y**4 + z**2 = 1'."
-    ),
-]
-SpeedOption = Annotated[str | None, Parameter(help="Speed c(x, y, z) of the weighted flow, e.g. '1 + x'.")]
-
-
-@Parameter(name="*")
-@dataclass(frozen=True)
-class FileOptions:
-    """What of a file or expression is the body, and how it is taken."""
-
-    units: Annotated[
-        str | None,
-        Parameter(help="Unit of a file's numbers: m, mm, cm, um, in, ft or km; lengths are metres from there on."),
-    ] = None
-    strict: Annotated[
-        bool, Parameter(negative="", help="Refuse edges, tips and coarse meshes; else rays end at them.")
-    ] = False
-    part: Annotated[str | None, Parameter(help="Which part of a file: largest, a number from 1, or a name.")] = None
-    cap: Annotated[float | None, Parameter(help="Close holes of a file up to this size, m.")] = None
-    union: Annotated[
-        bool, Parameter(negative="", help="Take the outer surface of all parts of a file, which may cross.")
-    ] = False
-    subdivide: Annotated[
-        str | None, Parameter(help="Loop's subdivision of a coarse smooth mesh: auto, or 1, 2 or 3 times.")
-    ] = None
-    surface: Annotated[
-        str | None,
-        Parameter(
-            help="smooth: a smooth surface through a mesh, on which rays creep; facets: its triangles as they are, all "
-            "parts, without rays; auto: facets where no smooth surface fits."
-        ),
-    ] = None
-    sew: Annotated[float | None, Parameter(help="Sew faces of a CAD file that are so far apart at most, m.")] = None
-
-    def given(self) -> dict[str, Any]:
-        """Options that are not the defaults, as the bodies take them."""
-        found = {field.name: getattr(self, field.name) for field in fields(self)}
-        for name in ("part", "subdivide"):
-            if isinstance(found[name], str) and found[name].isdigit():
-                found[name] = int(found[name])
-        # 0 equals False, and is a bad size that is to be told
-        return {name: value for name, value in found.items() if value is not None and value is not False}
-
-
-AS_IT_IS = FileOptions()
+Tell = Callable[[str], None]
 
 
 def parse_body(
@@ -95,7 +39,7 @@ def parse_body(
     *,
     options: FileOptions = AS_IT_IS,
     cache: bool = True,
-    progress: Progress | None = None,
+    progress: Tell | None = None,
 ) -> Any:
     """Make a body from ``name``, ``name:key=value,...``, a file's name or an expression.
 
@@ -115,7 +59,9 @@ def parse_body(
         known = f"give one of {', '.join(BODIES)}, e.g. ellipsoid:a=1.2,b=0.8,c=0.8, a file ({', '.join(MESHES + CAD)})"
         near = near_names(re.split(r"[^\w-]", text)[0], BODIES)
         raise InvalidInputError(f"unknown body {text!r}{near or f'; {known}, or an expression in x, y, z'}")
-    belong = _belonging(suffix, of_file, name in BODIES)
+    belong: tuple[str, ...] = () if name in BODIES else ("strict",)
+    if of_file:
+        belong = ("units", "strict", "part", "cap", "union", "surface", "sew" if suffix in CAD else "subdivide")
     if alien := [option for option in given if option not in belong]:
         what = f"{name} takes none" if not belong else f"{text!r} takes --{', --'.join(belong)}"
         if belong and not of_file and alien[0] != "sew":
@@ -138,13 +84,6 @@ def parse_body(
         raise InvalidInputError(f"{named}{error}") from error
 
 
-def _belonging(suffix: str, of_file: bool, named: bool) -> tuple[str, ...]:
-    """Options that a kind of body has."""
-    if of_file:
-        return (*FILE_OPTIONS, "surface", "sew" if suffix in CAD else "subdivide")
-    return () if named else ("strict",)
-
-
 def is_file(text: str, folder: Path = Path()) -> bool:
     """Whether a BODY names a file, whose lengths are metres: by its ending, or because there is one in the folder."""
     named = text.partition(":")[0] in BODIES
@@ -157,7 +96,7 @@ def title_of(text: str) -> str:
     return name if len(name) <= 60 else f"{name[:57]}..."
 
 
-def _with_charts(shape: Any, progress: Progress | None) -> Any:
+def _with_charts(shape: Any, progress: Tell | None) -> Any:
     """Body whose charts are made: flows need them, and of thin parts there may be none; bodies of pieces have none."""
     if any(getattr(shape, name, ()) for name in ("creases", "without_rays")):
         return shape
@@ -200,24 +139,47 @@ def _like_expression(text: str) -> bool:
     return bool(re.search(r"[-+*/(]", text) and re.search(r"(?<![A-Za-z_])[xyz](?![A-Za-z_])", text))
 
 
-def table_formats(text: str) -> tuple[str, ...]:
-    """Kinds of tables that are asked for.
+def each_once(option: str, text: str, known: Collection[str]) -> tuple[str, ...]:
+    """Names that an option gives, joined by commas, in capitals or not.
 
     Raises
     ------
     InvalidInputError
-        If one is unknown, or given twice.
+        If one is not known, or given twice.
 
     Examples
     --------
-    >>> table_formats("csv, mat")
+    >>> each_once("--format", "csv, MAT", ("csv", "mat"))
     ('csv', 'mat')
     """
-    names = tuple(name.strip().lower() for name in text.split(","))
-    unknown = [name for name in names if name not in FORMATS]
-    if unknown or len(set(names)) < len(names):
-        raise InvalidInputError(f"--format {text!r}: give some of {', '.join(FORMATS)}, each once")
-    return names
+    spelled = {name.lower(): name for name in known}
+    given = [name.strip().lower() for name in text.split(",")]
+    if not set(given) <= set(spelled) or len(set(given)) < len(given):
+        raise InvalidInputError(f"{option} {text!r}: give some of {', '.join(known)}, each once")
+    return tuple(spelled[name] for name in given)
+
+
+@dataclass(frozen=True)
+class Output:
+    """Where results of a body are written, and how.
+
+    Attributes
+    ----------
+    folder : Path
+    name : str
+        Of the body, for titles.
+    formats : tuple of str
+        Kinds of tables.
+    pictures : bool
+    backend : str
+        Of pictures in space.
+    """
+
+    folder: Path
+    name: str
+    formats: tuple[str, ...] = ("csv",)
+    pictures: bool = True
+    backend: str = "auto"
 
 
 def write_tables(
@@ -226,10 +188,20 @@ def write_tables(
     """Write a result, for `write_csv` by its name, as a table of each format; returns the names of the files."""
     from creeping import files
 
-    writers: dict[str, Callable[[Path], None]] = {
-        "csv": lambda path: files.write_csv(path, observed=observed, **named),
-        "mat": lambda path: files.write_mat(path, result, observed=observed),
-    }
-    for kind in formats:
-        writers[kind](stem.with_suffix(f".{kind}"))
+    if "csv" in formats:
+        files.write_csv(stem.with_suffix(".csv"), observed=observed, **named)
+    if "mat" in formats:
+        files.write_mat(stem.with_suffix(".mat"), result, observed=observed)
     return [f"{stem.name}.{kind}" for kind in formats]
+
+
+def flow_of(kind: str, body: Any, tolerance: float, *, n_rays: int, **asked: Any) -> Any:
+    """Flow that carries rays with an rms error of ``tolerance``: "direct", "map", or "auto", what is faster."""
+    import creeping as cr
+
+    if kind == "direct":
+        # errors of the steps add up and grow along the rays
+        return cr.DirectFlow(body, rtol=min(max(1e-4 * tolerance, 1e-13), 1e-8))
+    if kind == "map":
+        return cr.build_phase_map(body, tolerance=tolerance, **asked)
+    return cr.choose_flow(body, n_rays=n_rays, tolerance=tolerance, **asked)

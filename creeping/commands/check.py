@@ -7,33 +7,31 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from creeping.commands.body import AS_IT_IS, CAD, MESHES, Body, FileOptions, SpeedOption, is_file, parse_body
+from creeping.commands import options
+from creeping.commands.body import CAD, MESHES, is_file, parse_body
 
-WAVELENGTHS = 6.0
-"""Size of a body for which it is told how its field is made, where no wavenumber is given."""
-Json = Annotated[bool, Parameter(name="--json", negative="", help="Print as JSON.")]
 Wavenumber = Annotated[
-    float | None, Parameter(help="k, 1/L: whether the field's expansions reach there; a file's size in wavelengths.")
+    float | None,
+    Parameter(
+        group=options.FIELD, help="k, 1/L: whether the field's expansions reach there; a file's size in wavelengths."
+    ),
 ]
-Frequency = Annotated[str | None, Parameter(help='Instead of k, e.g. "10GHz": lengths are metres then.')]
-Wavelength = Annotated[str | None, Parameter(help='Instead of k, e.g. "3cm".')]
-SoundSpeed = Annotated[float | None, Parameter(help="With a frequency: of the medium, m/s; light if not given.")]
 Output = Annotated[
     Path | None, Parameter(name=["-o", "--output"], help="Folder for quality.png, a file's mesh where it is rough.")
 ]
 
 
 def check(
-    body: Body,
+    body: options.Body,
     *,
-    speed: SpeedOption = None,
-    file: FileOptions = AS_IT_IS,
+    speed: options.SpeedOption = None,
+    file: options.FileOptions = options.AS_IT_IS,
     wavenumber: Wavenumber = None,
-    frequency: Frequency = None,
-    wavelength: Wavelength = None,
-    sound_speed: SoundSpeed = None,
+    frequency: options.Frequency = None,
+    wavelength: options.Wavelength = None,
+    sound_speed: options.SoundSpeed = None,
     output: Output = None,
-    json_: Json = False,
+    json_: options.Json = False,
 ) -> int:
     """Verify a body: derivatives, closedness, orientation, cover and overlap of its charts; of a file its quality too.
 
@@ -45,11 +43,10 @@ def check(
         raise InvalidInputError(f"--wavenumber {wavenumber!r} is not a positive finite number")
     asked: dict[str, Any] = {}
     if any(value is not None for value in (wavenumber, frequency, wavelength, sound_speed)):
-        from creeping.commands.wave import asked_wavenumber, cure_of
+        from creeping.commands.wave import asked_wavenumber
 
-        option, text = ("--frequency", frequency or wavelength) if wavenumber is None else ("--wavenumber", wavenumber)
-        wavenumber, hertz = asked_wavenumber(wavenumber, frequency, wavelength, sound_speed)
-        asked = {"metres": hertz is not None, "cure": cure_of(option, text, hertz)}
+        wavenumber, hertz, cure = asked_wavenumber(wavenumber, frequency, wavelength, sound_speed)
+        asked = {"metres": hertz is not None, "cure": cure}
     mesh = is_file(body) and Path(body).suffix.lower() not in CAD
     if wavenumber is not None and speed is not None:
         raise InvalidInputError("--wavenumber is for rays of constant speed; leave out one of --speed and --wavenumber")
@@ -80,27 +77,21 @@ def check(
     return 0 if ok else 3
 
 
-def _field(
-    shape: Any, wavenumber: float | None, answer: dict[str, Any], texts: list[str], asked: dict[str, Any]
-) -> None:
-    """What a field of the body is made by, what that takes, and about which error it has."""
-    from creeping.commands.forecast import forecast
-    from creeping.field.arguments import wavelengths_across
-
-    k = wavenumber or WAVELENGTHS / wavelengths_across(shape, 1.0)
-    told = forecast(shape, k, "hard", **asked)
-    answer["field"] = {"body": told.body, "wavenumber": k, "nodes": told.nodes, "by": told.by}
-    texts[:0] = [told.body, f"far field, rigid, at k = {k:.4g}: {told.by}"]
-
-
 def _surface(
     shape: Any, wavenumber: float | None, answer: dict[str, Any], texts: list[str], asked: dict[str, Any]
 ) -> bool:
+    """Whether nothing is wrong with a surface; adds how its field is made, its checks, its fit and its range."""
     from creeping import check_surface
+    from creeping.commands.forecast import forecast
+    from creeping.field.arguments import wavelengths_across
     from creeping.geometry.parts import why_no_rays
 
     if getattr(shape, "speed", None) is None:
-        _field(shape, wavenumber, answer, texts, asked)
+        # of a body six wavelengths across where no wavenumber is given
+        k = wavenumber or 6.0 / wavelengths_across(shape, 1.0)
+        told = forecast(shape, k, "hard", **asked)
+        answer["field"] = {"body": told.body, "wavenumber": k, "nodes": told.nodes, "by": told.by}
+        texts[:0] = [told.body, f"far field, rigid, at k = {k:.4g}: {told.by}"]
     if why_no_rays(shape):
         answer["repairs"] = list(getattr(shape, "repairs", ()))
         texts += answer["repairs"]
@@ -112,9 +103,9 @@ def _surface(
         creases = [{"kind": c.kind, "pieces": [int(number) for number in c.pieces]} for c in report.creases]
         answer |= {"pieces": report.pieces, "creases": creases}
     if getattr(shape, "fit", None) is not None:
-        told = "quality" in answer
+        known = "quality" in answer
         answer |= {"fit": shape.fit.to_json(), "quality": shape.quality.to_json(), "repairs": list(shape.repairs)}
-        if not told:
+        if not known:
             texts += [*shape.repairs, shape.quality.summary(wavenumber)]
         texts.append(str(shape.fit))
     texts.append(str(report))
@@ -147,7 +138,7 @@ def _range(shape: Any, wavenumber: float, answer: dict[str, Any], texts: list[st
 
 def _mesh(
     body: str,
-    file: FileOptions,
+    file: options.FileOptions,
     wavenumber: float | None,
     output: Path | None,
     answer: dict[str, Any],
@@ -165,12 +156,10 @@ def _mesh(
     texts += [*mesh.repairs, quality.summary(wavenumber)]
     if output is None:
         return
+    from creeping.commands.resuming import make_folder
     from creeping.plotting.mesh_picture import MeshValues, mesh_picture
 
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InvalidInputError(f"cannot make the folder {output}: {error}; choose another with -o") from error
+    make_folder(output)
     shown = MeshValues(mesh.vertices, mesh.triangles, quality.badness, quality.bad, Path(body).name)
     mesh_picture(output / "quality.png", shown)
     answer["picture"] = str(output / "quality.png")

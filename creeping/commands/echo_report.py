@@ -1,19 +1,26 @@
 """What ``creeping rcs`` and ``creeping ts`` compute, write and say."""
 
+import json
+import sys
+import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from creeping import plotting
+from creeping._progress import Progress
 from creeping._typing import FloatArray
 from creeping._version import __version__
-from creeping.commands.echo_request import EchoRequest
-from creeping.commands.forecast import boundary_words
-from creeping.commands.resuming import SUMMARY, Unfinished
+from creeping.commands.body import each_once, parse_body
+from creeping.commands.echo_request import EchoRequest, echo_request, radians_hint
+from creeping.commands.forecast import boundary_words, forecast
+from creeping.commands.options import EchoOptions, FileOptions
+from creeping.commands.resuming import SUMMARY, asked_for, begun, kept
 from creeping.errors import InvalidInputError
-from creeping.field.boundary import BoundaryLike
+from creeping.field.boundary import parse_boundary
 from creeping.field.comparison import Comparison, compare
 from creeping.field.echo import Echo
 from creeping.field.impulse import RangeProfile, range_profile
@@ -25,56 +32,83 @@ from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface
 from creeping.shadow.status import FAILED, SINGULAR
 from creeping.sweeping.blocks import Rows
-from creeping.sweeping.echoes import backscatter, bistatic, echo_of
-
-TURN = 360.0
-"""Degrees after which azimuths repeat."""
-LEAST_BAND = 16
-"""Frequencies from which a band has a range profile."""
+from creeping.sweeping.echoes import backscatter, bistatic, echo_of, monostatic_method
 
 
-def computed(
-    body: Surface,
-    request: EchoRequest,
-    boundary: BoundaryLike,
-    azimuths: FloatArray,
-    elevations: FloatArray,
-    method: str,
-    cache: bool,
-    unfinished: Unfinished,
-    progress: Any,
-    rows: Callable[[Rows], None],
-) -> Any:
-    """Dataset of what a request asks for; see `creeping.sweeping.blocks.sweep_blocks`."""
-    asked: dict[str, Any] = {"wavenumbers": request.wavenumbers, "azimuth": azimuths, "elevation": elevations}
-    asked |= {"boundary": boundary, "method": method, "cache": cache, "progress": progress}
-    asked |= {"store": unfinished.parts, "resume": True, "rows": rows}
-    if request.monostatic:
-        return backscatter(body, **asked)
-    # one fan for all observers: currents cost no more than rays
-    chosen = "currents" if method == "auto" else method
-    return bistatic(body, **(asked | {"incidence": request.incidence, "method": chosen}))
+def run_echo(quantity: str, body: str, given: EchoOptions, file: FileOptions, **wave: Any) -> int:
+    """Compute, write and tell an echo; ``wave`` has the speed of sound, polarisations and boundary."""
+    started, method, output = time.perf_counter(), given.method, given.output or Path(quantity)
+    asked: dict[str, Any] = {"frequency": given.frequency, "wavelength": given.wavelength, **wave}
+    asked |= {"monostatic": given.monostatic, "bistatic": given.bistatic, "incidence": given.incidence}
+    request = echo_request(quantity, **asked)
+    for name in ("monostatic", "bistatic", "incidence"):
+        if hint := radians_hint(f"--{name}", asked[name]):
+            print(f"creeping: {hint}", file=sys.stderr)
+    boundary, mono, k = parse_boundary(request.boundary), request.monostatic, request.wavenumbers
+    words = asked | {"method": method} | file.given() | {"pictures": given.pictures, "formats": given.formats}
+    words |= {"compare": given.compare, "column": given.column, "align": given.align}
+    formats = each_once("--format", given.formats, ("csv", "mat"))
+    # before the time is spent
+    reference = reference_of(request, given.compare, given.column, given.align)
+    with Progress(quiet=given.json_) as progress:
+        shape = parse_body(body, options=file, cache=given.cache, progress=progress)
+        azimuths, elevations = request.angles(shape)
+        count = len(azimuths)
+        if method == "auto" and mono:
+            method = monostatic_method(shape, k, boundary, count)
+        radar, observers = ((azimuths, elevations), 1) if mono else (request.incidence, count)
+        seen: dict[str, Any] = {"radar": radar, "observers": observers, "metres": True, "cure": request.cure}
+        told = forecast(shape, k, boundary, method=method, **seen)
+        progress.note(f"{told.body}, {boundary_words(boundary)}")
+        unfinished = begun(output, quantity, asked_for(body, shape, **words), resume=given.resume)
+        if unfinished is None:
+            print((output / SUMMARY).read_text() if given.json_ else f"nothing is missing in {output}")
+            return 0
+        frequencies = f"{len(k)} frequenc{'ies' if len(k) > 1 else 'y'}"
+        progress(f"{count} angle{'s' * (count > 1)} x {frequencies} by {told.by}")
+        values = count * len(k)
+        progress.begin(0, values)
 
+        def echo_for(dataset: Any) -> Echo:
+            return echo_of(dataset, quantity, request.channels, request.angle_name, sound_speed=request.sound_speed)
 
-def asked_words(angles: FloatArray, request: EchoRequest) -> str:
-    """How much is computed."""
-    count, several = len(angles), len(request.wavenumbers)
-    return f"{count} angle{'s' * (count > 1)} x {several} frequenc{'ies' if several > 1 else 'y'}"
+        def rows(found: Rows) -> None:
+            """Write the rows that are there, with marks that others are missing."""
+            done = int(found.known.sum())
+            mark = f"incomplete: {done} of {values} values; {unfinished.mark}"
+            table = output / f"{quantity}.csv"
+            write_echo(table, echo_for(found.dataset), known=found.known, mark=mark)
+            missing = {
+                "values_done": done,
+                "values": values,
+                "resume": unfinished.again,
+                "files": [table.name, SUMMARY],
+            }
+            unfinished.write_summary(missing, complete=False)
 
+        def passed(done: float, total: int, seconds: float) -> None:
+            progress.told(values * done / total, values, seconds)
 
-def echo_for(request: EchoRequest, dataset: Any) -> Echo:
-    """Echo of a request's dataset."""
-    return echo_of(dataset, request.quantity, request.channels, request.angle_name, sound_speed=request.sound_speed)
-
-
-def write_rows(unfinished: Unfinished, request: EchoRequest, found: Rows) -> None:
-    """Write the rows that are there, with marks that others are missing."""
-    done, of = int(found.known.sum()), found.known.size
-    mark = f"incomplete: {done} of {of} values; {unfinished.mark}"
-    table = unfinished.output / f"{request.quantity}.csv"
-    write_echo(table, echo_for(request, found.dataset), known=found.known, mark=mark)
-    words = {"values_done": done, "values": of, "resume": unfinished.again, "files": [table.name, SUMMARY]}
-    unfinished.write_summary(words, complete=False)
+        with kept(unfinished, progress.message):
+            job: dict[str, Any] = {"wavenumbers": k, "azimuth": azimuths, "elevation": elevations, "boundary": boundary}
+            job |= {"cache": given.cache, "progress": passed, "store": unfinished.parts, "resume": True, "rows": rows}
+            if mono:
+                dataset = backscatter(shape, method=method, **job)
+            else:
+                # one fan for all observers: currents cost no more than rays
+                method = "currents" if method == "auto" else method
+                dataset = bistatic(shape, incidence=request.incidence, method=method, **job)
+            echo = echo_for(dataset)
+            progress("tables and pictures" if given.pictures else "tables")
+            comparisons, refused = compared(echo, reference, given.align)
+            pictured: dict[str, Any] = {"pictures": given.pictures, "formats": formats}
+            names, extra = write_results(output, echo, comparisons, shape, body, **pictured)
+            summary = summary_of(body, request, echo, dataset) | extra | refused
+            summary["files"] = [*names, SUMMARY]
+            unfinished.write_summary(summary, complete=True)
+    summary |= {"complete": True, "seconds": round(time.perf_counter() - started, 2)}
+    print(json.dumps(summary, indent=1) if given.json_ else readable(summary, output))
+    return 0
 
 
 def reference_of(
@@ -133,7 +167,7 @@ def compared(
         values = echo.hertz if cut.over == "frequency" else echo.angles
         options: dict[str, Any] = {"align": align if cut.over == "angle" else 0.0}
         if cut.over == "angle" and echo.angle_name == "azimuth" and not cut.polar:
-            options["period"] = TURN
+            options["period"] = 360.0
         try:
             found[channel] = compare(values, levels[at], cut.values, given, low=low[at], high=high[at], **options)
         except InvalidInputError as error:
@@ -153,15 +187,11 @@ def write_results(
     formats: tuple[str, ...] = ("csv",),
 ) -> tuple[list[str], dict[str, Any]]:
     """Write tables and pictures; their names, and what they add to the summary."""
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InvalidInputError(f"cannot make the folder {output}: {error}; choose another with -o") from error
     stem = echo.quantity
-    writers: dict[str, Callable[[Path, Echo], None]] = {"csv": write_echo, "mat": write_mat}
     names = [f"{stem}.{kind}" for kind in formats]
-    for kind in formats:
-        writers[kind](output / f"{stem}.{kind}", echo)
+    for file in names:
+        write = write_mat if file.endswith(".mat") else write_echo
+        write(output / file, echo)
     extra: dict[str, Any] = {"wrong_signs": wrong_signs(body)[0]} if is_piecewise(body) else {}
     for channel, found in comparisons.items():
         extra.setdefault("compared", {})[channel] = found.summary()
@@ -187,8 +217,8 @@ def _ranges(echo: Echo, body: Surface) -> tuple[float, float]:
 
 
 def _profiles(echo: Echo) -> dict[str, RangeProfile]:
-    """Range profiles by channel, of backscatter in one direction over a band of equal steps whose values are finite."""
-    if echo.incidence is not None or len(echo.azimuth) > 1 or len(echo.wavenumbers) < LEAST_BAND:
+    """Range profiles by channel, of backscatter in one direction over a band of 16 or more equal steps, all finite."""
+    if echo.incidence is not None or len(echo.azimuth) > 1 or len(echo.wavenumbers) < 16:
         return {}
     try:
         return {
@@ -204,25 +234,22 @@ def _drawn(
 ) -> list[str]:
     words: dict[str, Any] = {"title": _title(echo, name)}
     several, band = len(echo.azimuth) > 1, len(echo.wavenumbers) > 1
-    jobs: list[tuple[str, Any]] = []
-    if several and not band:
-        jobs.append((f"{stem}.png", lambda path: plotting.echo_cut_picture(path, echo, **words)))
-        polar = {"kind": "polar", **words}
-        jobs.append((f"{stem}_polar.png", lambda path: plotting.echo_cut_picture(path, echo, **polar)))
+    jobs: dict[str, Callable[[Path], None]] = {}
     if several and band:
-        jobs.append((f"{stem}_map.png", lambda path: plotting.echo_map_picture(path, echo, **words)))
-    if band and not several:
-        jobs.append((f"{stem}.png", lambda path: plotting.echo_band_picture(path, echo, **words)))
+        jobs[f"{stem}_map.png"] = lambda path: plotting.echo_map_picture(path, echo, **words)
+    elif several:
+        jobs[f"{stem}.png"] = lambda path: plotting.echo_cut_picture(path, echo, **words)
+        jobs[f"{stem}_polar.png"] = lambda path: plotting.echo_cut_picture(path, echo, kind="polar", **words)
+    elif band:
+        jobs[f"{stem}.png"] = lambda path: plotting.echo_band_picture(path, echo, **words)
     if profiles:
-        jobs.append(("range.png", lambda path: plotting.range_picture(path, profiles, echo, span, **words)))
+        jobs["range.png"] = lambda path: plotting.range_picture(path, profiles, echo, span, **words)
     names = []
-    for file, draw in jobs:
-        try:
+    for file, draw in jobs.items():
+        # what cannot be drawn in decibels the table says
+        with suppress(InvalidInputError):
             draw(output / file)
-        except InvalidInputError:
-            # nothing that can be drawn in decibels: the table says so
-            continue
-        names.append(file)
+            names.append(file)
     return names
 
 
@@ -243,7 +270,8 @@ def _title(echo: Echo, name: str) -> str:
 
 def summary_of(body: str, request: EchoRequest, echo: Echo, dataset: Any) -> dict[str, Any]:
     """What the summary file holds."""
-    least, largest = dataset["least_k_rho"].values, dataset["largest_transverse"].values
+    all_values = (dataset[name].values for name in ("least_k_rho", "largest_transverse"))
+    least, largest = (values[np.isfinite(values)] for values in all_values)
     return {
         "body": body,
         "version": __version__,
@@ -251,18 +279,13 @@ def summary_of(body: str, request: EchoRequest, echo: Echo, dataset: Any) -> dic
         "frequency_hz": [float(echo.hertz[0]), float(echo.hertz[-1])],
         "boundary": request.boundary,
         "validity": {
-            "least_k_rho": _extreme(np.nanmin, least),
-            "largest_transverse": _extreme(np.nanmax, largest),
+            "least_k_rho": float(least.min()) if least.size else None,
+            "largest_transverse": float(largest.max()) if largest.size else None,
         },
         "failed_incidences": int(np.sum(np.isin(dataset["incidence_status"].values, (SINGULAR, FAILED)))),
         "errors": dataset.attrs.get("errors"),
         "digest": dataset.attrs.get("sweep_digest"),
     }
-
-
-def _extreme(pick: Any, values: Any) -> float | None:
-    known = values[np.isfinite(values)]
-    return float(pick(known)) if known.size else None
 
 
 def readable(summary: dict[str, Any], output: Path) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from creeping._typing import FloatArray
+from creeping.commands.body import each_once
 from creeping.commands.forecast import size_words
 from creeping.commands.wave import cure_of
 from creeping.errors import InvalidInputError
@@ -19,7 +20,6 @@ from creeping.geometry.surface import Surface
 from creeping.sweeping.results import POLARISATIONS
 
 AXES = {"az": "azimuth", "el": "elevation"}
-WHOLE = {"azimuth": (0.0, 360.0), "elevation": (-90.0, 90.0)}
 MOST = 200_000
 """Angles of a cut."""
 FORMS = "az or el for a cut, az:FIRST:LAST:STEP for a part of one, az:20 or az:20,el:5 for one direction"
@@ -123,6 +123,13 @@ def echo_request(
     asked = monostatic if monostatic is not None else bistatic
     if asked is None and len(numbers) == 1 and incidence is None:
         asked = "az"
+    if boundary == "pec":
+        channels = each_once("--polarisation", polarisation or "HH,VV", POLARISATIONS)
+    elif polarisation is not None:
+        raise InvalidInputError("--polarisation is of a conductor; sound has none")
+    else:
+        # as datasets name it
+        channels = (boundary_name(parse_boundary(boundary)),)
     option_of_angles = "--bistatic" if bistatic is not None else "--monostatic"
     place = _place(option_of_angles, asked, at)
     name, span, step = _cut(option_of_angles, asked if place is None else None)
@@ -130,7 +137,7 @@ def echo_request(
         quantity=quantity,
         wavenumbers=numbers,
         sound_speed=sound_speed,
-        channels=_channels(polarisation, boundary),
+        channels=channels,
         boundary=boundary,
         monostatic=bistatic is None,
         incidence=(at[0], at[1]),
@@ -140,19 +147,6 @@ def echo_request(
         step=step,
         cure=cure_of(option, text, float(frequency_of(numbers.max(), sound_speed=sound_speed))),
     )
-
-
-def _channels(polarisation: str | None, boundary: str) -> tuple[str, ...]:
-    if boundary != "pec":
-        if polarisation is not None:
-            raise InvalidInputError("--polarisation is of a conductor; sound has none")
-        # as datasets name it
-        return (boundary_name(parse_boundary(boundary)),)
-    names = tuple(name.strip().upper() for name in (polarisation or "HH,VV").split(","))
-    unknown = [name for name in names if name not in POLARISATIONS]
-    if unknown or len(set(names)) < len(names):
-        raise InvalidInputError(f"--polarisation {polarisation!r}: give some of {', '.join(POLARISATIONS)}, each once")
-    return names
 
 
 def _pair(option: str, text: str, angles: Sequence[float]) -> tuple[float, float]:
@@ -195,7 +189,7 @@ def _cut(option: str, text: str | None) -> tuple[str, tuple[float, float], float
         raise InvalidInputError(f"{option} {text!r} is unknown; give {FORMS}, in degrees")
     name = AXES[short]
     if not rest:
-        return name, WHOLE[name], None
+        return name, (0.0, 360.0) if name == "azimuth" else (-90.0, 90.0), None
     numbers = _numbers(option, rest.replace(":", ","), rest.count(":") + 1)
     if len(numbers) != 3:
         raise InvalidInputError(f"{option} {text!r} has {len(numbers)} numbers; give {FORMS}, in degrees")

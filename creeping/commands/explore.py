@@ -6,16 +6,14 @@ from typing import Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from creeping.commands.body import AS_IT_IS, Body, FileOptions, SpeedOption, is_file, parse_body, title_of
+from creeping.commands import options
+from creeping.commands.body import is_file, parse_body, title_of
 
-_field = Group("Field")
 _page = Group("Page")
-MOVES = 1000
-"""Incidences that a page may be asked for: what a flow is chosen for."""
 
 
 def explore(
-    body: Body,
+    body: options.Body,
     *,
     direction: Annotated[tuple[float, float, float], Parameter(help="Where the wave travels at first.")] = (1, 1, 1),
     length: Annotated[float | None, Parameter(help="Travel time of the rays; where the waves have died away.")] = None,
@@ -23,15 +21,16 @@ def explore(
     spacing: Annotated[
         float | None, Parameter(help="Of iso-phase curves; an eighth of the length, 0 for none.")
     ] = None,
-    wavenumber: Annotated[float | None, Parameter(group=_field, help="In 1/L; 40 over the body's size.")] = None,
+    wavenumber: Annotated[float | None, Parameter(group=options.FIELD, help="In 1/L; 40 over the body's size.")] = None,
     frequency: Annotated[
-        str | None, Parameter(group=_field, help='Instead, e.g. "10GHz" or "3cm": lengths are metres then.')
+        str | None, Parameter(group=options.FIELD, help='Instead, e.g. "10GHz" or "3cm": lengths are metres then.')
     ] = None,
     sound_speed: Annotated[
-        float | None, Parameter(group=_field, help="Of the medium, m/s, if the wave is sound; light if not given.")
+        float | None,
+        Parameter(group=options.FIELD, help="Of the medium, m/s, if the wave is sound; light if not given."),
     ] = None,
     boundary: Annotated[
-        str, Parameter(group=_field, help="soft, hard, pec, or impedance:ETA, e.g. impedance:0.5+0.2j.")
+        str, Parameter(group=options.FIELD, help="soft, hard, pec, or impedance:ETA, e.g. impedance:0.5+0.2j.")
     ] = "hard",
     export: Annotated[
         Path | None, Parameter(group=_page, help="Write one incidence as an HTML file, and serve nothing.")
@@ -39,12 +38,14 @@ def explore(
     port: Annotated[int, Parameter(group=_page, help="The next free one is taken if it is in use.")] = 8080,
     browser: Annotated[bool, Parameter(group=_page, help="Open the page in a browser.")] = True,
     tolerance: Annotated[float, Parameter(help="Error at the ends of the rays.")] = 1e-5,
-    speed: SpeedOption = None,
-    file: FileOptions = AS_IT_IS,
-    cache: Annotated[bool, Parameter(help="Keep the phase map for the next run.")] = True,
+    speed: options.SpeedOption = None,
+    file: options.FileOptions = options.AS_IT_IS,
+    cache: options.Cache = True,
 ) -> int:
     """Turn the incidence by hand, and watch shadow line, rays, iso-phase curves and field follow."""
+    import creeping as cr
     from creeping.errors import CreepingError, InvalidInputError
+    from creeping.explorer.frames import step_of, steps_of
     from creeping.explorer.request import ViewRequest, angles
     from creeping.geometry.directions import unit_direction
     from creeping.geometry.surface import size
@@ -70,7 +71,12 @@ def explore(
     cut = float(round(phi))
     request = ViewRequest(theta, phi, rays, far, gap, k, boundary, cut, metres=metres, sound_speed=sound_speed)
     name = title_of(body)
-    flow = _flow(shape, request, MOVES if export is None else 1, tolerance, cache, progress)
+    # a page may be asked for a thousand incidences: what a flow is chosen for
+    moves = 1000 if export is None else 1
+    steps, step = steps_of(request.length, step_of(shape))
+    progress(f"choosing what carries {moves} incidence{'s' * (moves != 1)} of {request.rays} rays")
+    asked: dict[str, Any] = {"length": steps * step, "n_steps": steps, "cache": cache, "progress": progress}
+    flow = cr.choose_flow(shape, n_rays=moves * request.rays, tolerance=tolerance, **asked)
     if export is not None:
         from creeping.explorer.export import export_page
 
@@ -96,24 +102,6 @@ def _wave(
     if ":" in frequency:
         raise InvalidInputError(f"--frequency {frequency!r} is a range; the page has one, and a slider")
     return float(of_text(frequency, sound_speed=sound_speed)), metres
-
-
-def _flow(body: Any, request: Any, moves: int, tolerance: float, cache: bool, progress: Any) -> Any:
-    """What carries the rays at the steps of the page."""
-    import creeping as cr
-    from creeping.explorer.preview import step_of, steps_of
-
-    steps, step = steps_of(request.length, step_of(body))
-    progress(f"choosing what carries {moves} incidence{'s' * (moves != 1)} of {request.rays} rays")
-    return cr.choose_flow(
-        body,
-        n_rays=moves * request.rays,
-        length=steps * step,
-        n_steps=steps,
-        tolerance=tolerance,
-        cache=cache,
-        progress=progress,
-    )
 
 
 def _round(value: float) -> float:

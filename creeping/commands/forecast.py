@@ -18,9 +18,6 @@ from creeping.geometry.parts import why_no_rays
 from creeping.geometry.piecewise import has_edges, is_piecewise
 from creeping.sweeping.echoes import seconds_of_currents
 
-SMALL, LARGE = 0.03, 3e3
-"""Wavelengths across beyond which a unit is asked about: a thousandth of 30, and a thousand times 3."""
-KINDS = {"soft": "soft (pressure release)", "hard": "hard (rigid)", "pec": "perfect conductor"}
 SOLVED = "errors of 0.01 to 1 % of the largest amplitude (0.1 dB)"
 COARSE = "errors of 0.1 to 3 % of the largest amplitude (0.3 dB), for want of time: coarse tiles and few steps"
 """Of the equation and the T-matrix: what they stated on bodies with edges and without."""
@@ -46,7 +43,8 @@ def boundary_words(*boundaries: BoundaryLike) -> str:
     ('soft (pressure release) and perfect conductor', 'impedance:0.5')
     """
     names = [boundary_name(one) for one in boundaries]
-    return " and ".join(KINDS.get(name, name) for name in names)
+    kinds = {"soft": "soft (pressure release)", "hard": "hard (rigid)", "pec": "perfect conductor"}
+    return " and ".join(kinds.get(name, name) for name in names)
 
 
 def duration(seconds: float) -> str:
@@ -80,7 +78,8 @@ def size_words(shape: Any, wavenumbers: ArrayLike, *, metres: bool, cure: str) -
     except InvalidInputError as error:
         word = "small" if ends[0] < 1 else "large"
         raise InvalidInputError(f"the body is {size}, too {word} for any field; {cure}") from error
-    doubt = "small" if ends[1] < SMALL else "large" if ends[0] > LARGE else ""
+    # a unit is asked about from a thousandth of 30 wavelengths, and from a thousand times 3
+    doubt = "small" if ends[1] < 0.03 else "large" if ends[0] > 3e3 else ""
     return f"{size} (so {doubt}? {cure})" if doubt else size
 
 

@@ -18,10 +18,10 @@ from creeping._version import __version__
 from creeping.commands import check as _checking
 from creeping.commands import echo as _echo_command
 from creeping.commands import explore as _explore_command
-from creeping.commands import resuming
+from creeping.commands import options, resuming
 from creeping.commands import sweep as _sweep_command
 from creeping.commands import upkeep as _upkeep
-from creeping.commands.body import AS_IT_IS, HELP, Body, FileOptions, SpeedOption, parse_body, table_formats, title_of
+from creeping.commands.body import Output, each_once, flow_of, parse_body, title_of
 
 app = App(
     name="creeping",
@@ -35,11 +35,8 @@ app = App(
 cache_app = App(name="cache", help="Stored phase maps and fitted bodies: list, verify, clear.")
 app.command(cache_app)
 
-_output = Group("Output")
-_field = Group("Field")
 _wave = Group("Incident wave", validator=validators.mutually_exclusive)
-Folder = Annotated[Path, Parameter(name=["-o", "--output"], group=_output, help="Folder for the results.")]
-Json = Annotated[bool, Parameter(name="--json", negative="", group=_output, help="Print the summary as JSON.")]
+Folder = Annotated[Path, Parameter(name=["-o", "--output"], group=options.OUTPUT, help="Folder for the results.")]
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -56,24 +53,18 @@ def main(arguments: list[str] | None = None) -> None:
         code = app(given, exit_on_error=False)
     except CycloptsError:
         code = 2
-    except CreepingError as error:
-        print(f"creeping: {_as_options(str(error))}", file=sys.stderr)
-        code = 3
-    except KeyboardInterrupt:
-        print("creeping: interrupted", file=sys.stderr)
-        code = 130
     except BrokenPipeError:
         code = 0
-    except (MemoryError, OverflowError) as error:
-        reason = str(error) or "an array is too large"
-        print(
-            f"creeping: not enough memory ({reason}); ask for fewer or shorter rays, or fewer directions",
-            file=sys.stderr,
-        )
-        code = 3
-    except OSError as error:
-        print(f"creeping: {error}", file=sys.stderr)
-        code = 3
+    except (CreepingError, KeyboardInterrupt, MemoryError, OverflowError, OSError) as error:
+        code, words = 3, str(error)
+        if isinstance(error, CreepingError):
+            words = _as_options(words)
+        elif isinstance(error, KeyboardInterrupt):
+            code, words = 130, "interrupted"
+        elif not isinstance(error, OSError):
+            reason = words or "an array is too large"
+            words = f"not enough memory ({reason}); ask for fewer or shorter rays, or fewer directions"
+        print(f"creeping: {words}", file=sys.stderr)
     raise SystemExit(code if isinstance(code, int) else 0)
 
 
@@ -88,7 +79,7 @@ def _as_options(text: str) -> str:
     from dataclasses import fields
     from inspect import signature
 
-    names = {field.name for field in fields(FileOptions)}
+    names = {field.name for kind in (options.FileOptions, options.EchoOptions) for field in fields(kind)}
     names.update(*(signature(command).parameters for command in (run, _echo_command.ts)))
     # k is in messages whichever of three options gave it
     words = "|".join(sorted(names - {"wavenumber", "body", "file"}, key=len, reverse=True))
@@ -104,7 +95,7 @@ def _as_options(text: str) -> str:
 
 @app.command
 def run(
-    body: Body,
+    body: options.Body,
     *,
     direction: Annotated[
         tuple[float, float, float] | None, Parameter(help="Where the wave travels; need not be unit.", group=_wave)
@@ -131,23 +122,22 @@ def run(
         Literal["auto", "map", "direct"],
         Parameter(help="Phase map or direct integration; auto takes what is faster, its preparation included."),
     ] = "auto",
-    speed: SpeedOption = None,
-    file: FileOptions = AS_IT_IS,
-    wavenumber: Annotated[float | None, Parameter(group=_field, help="k, 1/L: adds the field to the results.")] = None,
-    frequency: Annotated[
-        str | None, Parameter(group=_field, help='Instead of k, e.g. "10GHz": lengths are metres then.')
+    speed: options.SpeedOption = None,
+    file: options.FileOptions = options.AS_IT_IS,
+    wavenumber: Annotated[
+        float | None, Parameter(group=options.FIELD, help="k, 1/L: adds the field to the results.")
     ] = None,
-    wavelength: Annotated[str | None, Parameter(group=_field, help='Instead of k, e.g. "3cm".')] = None,
-    sound_speed: Annotated[
-        float | None, Parameter(group=_field, help="With a frequency: of the medium, m/s; that of light if not given.")
-    ] = None,
+    frequency: options.Frequency = None,
+    wavelength: options.Wavelength = None,
+    sound_speed: options.SoundSpeed = None,
     boundary: Annotated[
-        str | None, Parameter(group=_field, help="soft (if not given), hard, pec or impedance:ETA, e.g. 0.5+0.2j.")
+        str | None,
+        Parameter(group=options.FIELD, help="soft (if not given), hard, pec or impedance:ETA, e.g. 0.5+0.2j."),
     ] = None,
     observe: Annotated[
         list[str] | None,
         Parameter(
-            group=_field,
+            group=options.FIELD,
             negative="",
             help="Where the far field is wanted; may be repeated. cut:PHI:STEP is theta from -180 to 180 in the plane "
             "PHI, without STEP one that fits the lobes, grid:STEP all theta and phi (gives far.ffe), THETA,PHI one "
@@ -157,31 +147,31 @@ def run(
     ] = None,
     polarisation: Annotated[
         str | None,
-        Parameter(group=_field, help="Of a conductor in far.png: HH, VV, HV, VH, joined by commas. HH,VV."),
+        Parameter(group=options.FIELD, help="Of a conductor in far.png: HH, VV, HV, VH, joined by commas. HH,VV."),
     ] = None,
     plane: Annotated[
         list[str] | None,
         Parameter(
-            group=_field,
+            group=options.FIELD,
             negative="",
             help="Planes through the middle of the body on which the total field is wanted; may be repeated: incidence "
             "(the direction of the wave and the body's longest side), xy, xz, yz, with :STEP for a spacing of points "
             "of your own. Gives plane.csv and plane.png.",
         ),
     ] = None,
-    cache: Annotated[bool, Parameter(help="Keep the phase map for the next run.")] = True,
-    pictures: Annotated[bool, Parameter(group=_output, help="Draw pictures; --no-pictures leaves them out.")] = True,
+    cache: options.Cache = True,
+    pictures: options.Pictures = True,
     backend: Annotated[
-        Literal["auto", "pyvista", "matplotlib"], Parameter(group=_output, help="What draws in 3-D.")
+        Literal["auto", "pyvista", "matplotlib"], Parameter(group=options.OUTPUT, help="What draws in 3-D.")
     ] = "auto",
-    formats: Annotated[str, Parameter(name="--format", group=_output, help=HELP)] = "csv",
-    json_: Json = False,
-    resume: _echo_command.Resume = False,
+    formats: options.Formats = "csv",
+    json_: options.Json = False,
+    resume: options.Resume = False,
 ) -> int:
     """Shadow line, creeping rays, iso-phase curves, pictures and files for one incidence."""
-    options = {name: value for name, value in locals().items() if name not in ("body", "file", "output", "json_")}
-    options |= file.given()
-    del options["resume"]
+    words = {name: value for name, value in locals().items() if name not in ("body", "file", "output", "json_")}
+    words |= file.given()
+    del words["resume"]
     import numpy as np
 
     import creeping as cr
@@ -189,44 +179,52 @@ def run(
     from creeping.commands import run_field as _field_run
     from creeping.commands import run_plane as _plane_run
     from creeping.commands import run_report as _run_results
-    from creeping.commands import run_solved as _run_solved
+    from creeping.geometry.incident import PlaneWave, PointSource
     from creeping.geometry.parts import why_no_rays
+    from creeping.rays.fan import enough_steps
     from creeping.rays.reach import ray_length
 
     started = time.perf_counter()
-    tables = table_formats(formats)
+    written = Output(output, title_of(body), each_once("--format", formats, ("csv", "mat")), pictures, backend)
     for name, value in (("length", length), ("spacing", spacing)):
         if isinstance(value, float) and not (np.isfinite(value) and value > 0):
             raise cr.CreepingError(f"--{name} {value!r} is not a positive finite number")
     wave: dict[str, Any] = {"frequency": frequency, "wavelength": wavelength, "sound_speed": sound_speed}
     wave |= {"polarisation": polarisation, "weighted": speed is not None}
     of = of or ("travel_time" if source is None else "eikonal")
-    incident = _run_results.asked_wave(direction, source)
+    if source is None and direction is None:
+        raise cr.InvalidInputError(
+            "give --direction X Y Z, where a plane wave travels, or --source X Y Z, a point source"
+        )
+    incident: Any = PlaneWave(direction or ()) if source is None else PointSource(source)
     job = _field_run.job(wavenumber, boundary, observe, direction, **wave)
     with Progress(quiet=json_) as progress:
         shape = parse_body(body, speed, options=file, cache=cache, progress=progress)
-        planes = _plane_run.asked_planes(plane, job)
+        planes = [_plane_run.parse_plane(text) for text in plane or ()]
+        if planes and job is None:
+            raise cr.InvalidInputError("--plane needs --wavenumber or --frequency, which ask for the field")
         if job:
             told = job.forecast(shape, incident)
             progress.note(told.body)
             kind = _forecast.boundary_words(job.boundary)
             progress.note(f"{kind}{'' if boundary else ', as no --boundary is given'}: far field by {told.by}")
             job = job.fitted(shape)
-        unfinished = resuming.begun(output, "run", resuming.asked_for(body, shape, **options), resume=resume)
+        unfinished = resuming.begun(output, "run", resuming.asked_for(body, shape, **words), resume=resume)
         if unfinished is None:
             print((output / resuming.SUMMARY).read_text() if json_ else f"nothing is missing in {output}")
             return 0
         if why_no_rays(shape):
-            result = _run_solved.run_solved(
-                shape, job, incident, output, body, planes, tables, pictures, backend, progress, unfinished
-            )
-            print(json.dumps(result, indent=1) if json_ else _run_solved.readable(result, output))
+            result = _run_results.run_solved(shape, job, incident, planes, written, progress, unfinished)
+            print(json.dumps(result, indent=1) if json_ else _run_results.readable_solved(result, output))
             return 0
         progress("shadow line")
         line = cr.shadow_line(shape, source=incident)
         length = ray_length(line, length, wavenumber=job.wavenumber if job else None)
         progress("flow")
-        carrier, steps = _carrier(flow, shape, line, rays, length, tolerance, cache, progress)
+        steps = enough_steps(shape, length)
+        asked: dict[str, Any] = {"length": length, "n_steps": steps, "cache": cache, "progress": progress}
+        # rays are inserted where neighbours part
+        carrier = flow_of(flow, shape, tolerance, n_rays=2 * rays, **asked)
         progress("creeping rays")
         fan = cr.launch(carrier, line, length=length, n_rays=rays, n_steps=steps, launch_from=launch_from)
         step = spacing or fan.length / 16
@@ -237,22 +235,17 @@ def run(
                 progress("field")
                 far, field_seconds = job.far_field(fan, unfinished, progress.told)
             progress("pictures and files" if pictures else "files")
-            drawn_with = backend if pictures else None
-            summary["files"], summary["drawn_by"] = _run_results.write_results(
-                output, line, fan, curves, drawn_with, tables, name=title_of(body), **(job.wave if job else {})
-            )
-            written: dict[str, Any] = {"pictures": pictures, "formats": tables}
+            asked = job.wave if job else {}
+            summary["files"], summary["drawn_by"] = _run_results.write_results(line, fan, curves, written, **asked)
             if job:
-                summary["field"], names = job.write(far, fan, output, backend, title_of(body), **written)
+                summary["field"], names = job.write(far, fan, written)
                 summary["field"]["seconds"] = field_seconds
                 summary["files"][-1:-1] = names
             if job and planes:
-                asked = planes, job, fan, output, title_of(body), progress
-                summary["planes"], names = _plane_run.write_planes(*asked, **written)
+                summary["planes"], names = _plane_run.write_planes(planes, job, fan, written, progress)
                 summary["files"][-1:-1] = names
             summary["seconds"] = round(time.perf_counter() - started, 2)
             unfinished.write_summary(summary, complete=True)
-            unfinished.finished()
     print(json.dumps(summary, indent=1) if json_ else _run_results.readable(summary, output))
     return 0
 
@@ -297,24 +290,6 @@ def _studies() -> Any:
     return import_module("studies")
 
 
-def _carrier(
-    flow: str, shape: Any, line: Any, rays: int, length: float, tolerance: float, cache: bool, progress: Any
-) -> tuple[Any, int]:
-    """Flow that carries the fan, and the number of its steps."""
-    import creeping as cr
-    from creeping.rays.fan import enough_steps
-
-    steps = enough_steps(shape, length)
-    if flow == "direct":
-        # errors of the steps add up and grow along the rays
-        return cr.DirectFlow(shape, rtol=min(max(1e-4 * tolerance, 1e-13), 1e-8)), steps
-    asked = {"length": length, "n_steps": steps, "tolerance": tolerance, "cache": cache, "progress": progress}
-    if flow == "map":
-        return cr.build_phase_map(shape, **asked), steps
-    # rays are inserted where neighbours part
-    return cr.choose_flow(shape, n_rays=2 * rays, **asked), steps
-
-
 @app.command
 def figure(
     name: Annotated[str | None, Parameter(help="Name of the figure; see --list.")] = None,
@@ -324,7 +299,7 @@ def figure(
     all_: Annotated[bool, Parameter(name="--all", negative="", help="Draw every figure.")] = False,
     list_: Annotated[bool, Parameter(name="--list", negative="", help="List the figures.")] = False,
     quick: Annotated[bool, Parameter(negative="", help="Coarser and faster.")] = False,
-    json_: Json = False,
+    json_: options.Json = False,
 ) -> int:
     """Draw figures of the paper, each with a sidecar of its parameters, error and seconds; from a clone alone."""
     studies = _studies()

@@ -71,10 +71,7 @@ class Unfinished:
         """Make the folder of the parts."""
         from creeping.files import write_text
 
-        try:
-            self.parts.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InvalidInputError(f"cannot make the folder {self.output}: {error}; choose another with -o") from error
+        make_folder(self.parts, self.output)
         write_text(self.parts / ASKED, json.dumps(self.asked, indent=1) + "\n")
 
     def kept_parts(self) -> "Parts":
@@ -90,15 +87,27 @@ class Unfinished:
             self._shown = time.monotonic()
 
     def write_summary(self, summary: dict[str, Any], *, complete: bool) -> None:
-        """Write the summary file, without the seconds, which are those of one run."""
+        """Write the summary file, without the seconds, which are those of one run; the parts go when all is written."""
         from creeping.files import write_text
 
         text = json.dumps({"complete": complete, **_timeless(summary), "asked": self.asked}, indent=1)
         write_text(self.output / SUMMARY, text + "\n")
+        if complete:
+            shutil.rmtree(self.parts, ignore_errors=True)
 
-    def finished(self) -> None:
-        """Remove the parts: all files are written."""
-        shutil.rmtree(self.parts, ignore_errors=True)
+
+def make_folder(folder: Path, asked: Path | None = None) -> None:
+    """Make a folder, of results that were ``asked`` for, or in it.
+
+    Raises
+    ------
+    InvalidInputError
+        If it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InvalidInputError(f"cannot make the folder {asked or folder}: {error}; choose another with -o") from error
 
 
 def _timeless(value: Any) -> Any:

@@ -3,17 +3,16 @@
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from creeping import files, plotting
 from creeping._typing import ArrayLike, FloatArray
-from creeping.commands.body import write_tables
+from creeping.commands.body import Output, each_once, write_tables
 from creeping.commands.forecast import Forecast, forecast, radar_of
 from creeping.commands.resuming import Unfinished
-from creeping.commands.wave import asked_wavenumber, cure_of, frequency_words
+from creeping.commands.wave import asked_wavenumber, frequency_words
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.body_currents import cached_currents
 from creeping.field.boundary import BoundaryLike, parse_boundary
@@ -24,7 +23,7 @@ from creeping.field.far import far_in_parts
 from creeping.field.far_result import FarField, turned_to_azimuth
 from creeping.field.forward import lobe_step
 from creeping.field.uncertainty import far_field_uncertainty
-from creeping.field.validity_range import Validity, validity
+from creeping.field.validity_range import validity
 from creeping.files.ffe import grid_directions
 from creeping.geometry.directions import unit_direction, unit_directions
 from creeping.geometry.incident import REMEDY, PlaneWave, incident_words
@@ -39,9 +38,6 @@ DPI = 200
 MOST = 200_000
 """Directions of one run."""
 FORMS = "cut:PHI, cut:PHI:STEP, grid:STEP, THETA,PHI or backscatter, in degrees"
-WAVES = ("--wavenumber", "--frequency", "--wavelength")
-FINEST = 0.05
-"""Step, degrees, of a cut that is not given one, at the least."""
 POLARISATIONS = {"VV": "tt", "VH": "tp", "HV": "pt", "HH": "pp"}
 """Received and transmitted, V along theta and H along phi, and the names of the components in pictures."""
 
@@ -91,7 +87,8 @@ class Job:
 
     def fitted(self, body: Surface) -> "Job":
         """The job with cuts whose step fits the lobes, of those that have none given."""
-        step = max(lobe_step(body, self.wavenumber, monostatic=False), FINEST)
+        # no finer than a twentieth of a degree
+        step = max(lobe_step(body, self.wavenumber, monostatic=False), 0.05)
         found = replace(self, targets=tuple(target.fitted(step) for target in self.targets))
         found.check_count()
         return found
@@ -119,6 +116,11 @@ class Job:
         """Wavenumber and boundary, as pictures ask for them."""
         return {"wavenumber": self.wavenumber, "boundary": self.boundary}
 
+    @property
+    def asked(self) -> dict[str, Any]:
+        """Wavenumber, boundary and order, as fields ask for them."""
+        return self.wave | {"order": ORDER}
+
     def told(self, unit: str) -> str:
         """Wavenumber and frequency in words."""
         wave = f"k = {self.wavenumber:g}/{unit}"
@@ -131,7 +133,6 @@ class Job:
     ) -> tuple[FarField, float]:
         """Far field in the directions of all targets, one after the other, and the seconds that it took."""
         started = time.perf_counter()
-        asked: dict[str, Any] = {"wavenumber": self.wavenumber, "boundary": self.boundary, "order": ORDER}
         parts, there = unfinished.kept_parts(), list[FarField]()
         count = len(self.directions)
 
@@ -147,7 +148,7 @@ class Job:
             return found
 
         try:
-            far = far_in_parts(fan, self.directions, keep=keep, **asked)
+            far = far_in_parts(fan, self.directions, keep=keep, **self.asked)
         except BaseException:
             if there:
                 self._write_rows(FarField.joined(there), unfinished)
@@ -190,26 +191,18 @@ class Job:
             far = replace(far, total=np.einsum("nab,nbc->nac", turn, far.total), parts=parts, error=error)
         return replace(far, unit=self.unit or far.unit)
 
-    def write(
-        self,
-        far: FarField,
-        of: RayFan | Solution,
-        output: Path,
-        backend: str,
-        name: str,
-        *,
-        pictures: bool = True,
-        formats: Sequence[str] = ("csv",),
-    ) -> tuple[dict[str, Any], list[str]]:
-        """Write the files of a far field of the body ``name``; returns the entry of the summary and their names."""
+    def write(self, far: FarField, of: RayFan | Solution, output: Output) -> tuple[dict[str, Any], list[str]]:
+        """Write the files of a far field; returns the entry of the summary and their names."""
         direction = of.line.direction if isinstance(of, RayFan) else of.directions[0]
-        names = self._tables(far, direction, output, formats)
-        if pictures:
-            names += self._pictures(far, of, output, backend, name)
+        names = self._tables(far, direction, output)
+        if output.pictures:
+            names += self._pictures(far, of, output)
         methods, counts = np.unique(far.method, return_counts=True)
         size = np.abs(far.total)
         finite = np.isfinite(size)
-        entry = {
+        largest, off = float(np.max(size[finite], initial=0.0)), far.stated_error
+        top = float(cross_section_decibels(largest))
+        entry: dict[str, Any] = {
             "wavenumber": self.wavenumber,
             "frequency": self.frequency,
             "unit": far.unit,
@@ -217,24 +210,26 @@ class Job:
             "order": far.order,
             "observe": [target.text for target in self.targets],
             "directions": len(far.directions),
-            "largest": float(np.max(size[finite], initial=0.0)),
-            "largest_db": _finite(cross_section_decibels(np.max(size[finite], initial=0.0))),
+            "largest": largest,
+            "largest_db": top if np.isfinite(top) else None,
             "not_finite": int(np.sum(~finite)),
             "methods": {str(name): int(count) for name, count in zip(methods, counts, strict=True)},
             "unresolved": int(far.unresolved.sum()),
-            "error": _stated_error(far),
+            "error": {"rms": None, "max": None, "by": None}
+            if off is None
+            else {"rms": off[0], "max": off[1], "by": far.error_source},
         }
         if isinstance(of, RayFan):
-            entry["validity"] = _named(validity(of, wavenumber=self.wavenumber))
+            found = validity(of, wavenumber=self.wavenumber)._asdict()
+            entry["validity"] = {name: float(one) if np.isfinite(one) else None for name, one in found.items()}
             if hasattr(of.body, "coarse_fit"):
                 entry["uncertain_by"] = self._uncertainty(far, of)
         return entry, names
 
     def _uncertainty(self, far: FarField, fan: RayFan) -> dict[str, Any]:
         """Rms and largest change on the second fit, or why there is none to tell."""
-        asked: dict[str, Any] = {"wavenumber": self.wavenumber, "boundary": self.boundary, "order": ORDER}
         try:
-            change = far_field_uncertainty(fan, far.directions, **asked)
+            change = far_field_uncertainty(fan, far.directions, **self.asked)
         except CreepingError as error:
             # the second fit may have a shadow line that cannot be followed
             return {"rms": None, "max": None, "reason": str(error)}
@@ -248,65 +243,57 @@ class Job:
         ends = np.cumsum([len(target.directions) for target in self.targets])
         return [far.take(slice(end - len(t.directions), end)) for t, end in zip(self.targets, ends, strict=True)]
 
-    def _tables(self, far: FarField, direction: FloatArray, output: Path, formats: Sequence[str]) -> list[str]:
+    def _tables(self, far: FarField, direction: FloatArray, output: Output) -> list[str]:
         texts = [target.text for target in self.targets for _ in target.directions]
         angles = np.concatenate([target.angles for target in self.targets])
-        names = write_tables(output / "far", formats, far, observed=(texts, angles), far=far)
+        names = write_tables(output.folder / "far", output.formats, far, observed=(texts, angles), far=far)
         for target, piece in zip(self.targets, self._pieces(far), strict=True):
             # a .ffe file holds no infinity; the table does
             if target.kind == "grid" and np.all(np.isfinite(piece.total)):
-                where = output / "far.ffe"
+                where = output.folder / "far.ffe"
                 files.write_ffe(where, piece, target.theta, target.phi, direction=direction)
                 names.append(where.name)
         return names
 
-    def _pictures(self, far: FarField, of: RayFan | Solution, output: Path, backend: str, name: str) -> list[str]:
-        names = []
-        title = f"{name}, {_place(of)}\n{self.told(far.unit)}, {far.boundary}{_off(far)}".replace("$", r"\$")
+    def _pictures(self, far: FarField, of: RayFan | Solution, output: Output) -> list[str]:
+        names, folder = [], output.folder
+        shown: dict[str, Any] = {
+            "wave": self.told(far.unit),
+            "name": output.name,
+            "backend": output.backend,
+            "dpi": DPI,
+        }
+        source = of.line.source if isinstance(of, RayFan) else PlaneWave(of.directions[0])
+        known = far.error[np.isfinite(far.error)]
+        off = f"; error {np.median(known):.1g} {far.unit} in the median" if len(known) else ""
+        title = f"{output.name}, {incident_words(source)}\n{self.told(far.unit)}, {far.boundary}{off}".replace(
+            "$", r"\$"
+        )
         # cuts of one step are one picture
         cuts: dict[int, dict[str, FarField]] = {}
         for target, piece in zip(self.targets, self._pieces(far), strict=True):
             if target.kind == "cut":
                 cuts.setdefault(len(target.theta), {})[f"φ = {np.degrees(target.phi[0]):g}°"] = piece
-        drawn = [one for one in cuts.values() if any(_visible(piece) for piece in one.values())]
+        # zeros, and what is not finite, cannot be drawn in decibels
+        drawn = [
+            one
+            for one in cuts.values()
+            if any(np.any(np.isfinite(piece.total) & (piece.total != 0)) for piece in one.values())
+        ]
         for number, group in enumerate(drawn, 1):
             theta = next(t.theta for t in self.targets if len(t.theta) == len(next(iter(group.values())).total))
             words: dict[str, Any] = {"quantity": "rcs", "components": self.components, "title": title, "dpi": DPI}
             names.append("far.png" if number == 1 else f"far_{number}.png")
-            plotting.far_cut_picture(output / names[-1], theta, group, parts=len(group) == 1, angle_name="θ", **words)
+            plotting.far_cut_picture(folder / names[-1], theta, group, parts=len(group) == 1, angle_name="θ", **words)
         if far.error_by == "extinction":
             currents = cached_currents(of, self.wavenumber, self.boundary) if isinstance(of, RayFan) else of.currents()
-            plotting.currents_picture(
-                output / "field.png", currents, wave=self.told(far.unit), name=name, backend=backend, dpi=DPI
-            )
+            plotting.currents_picture(folder / "field.png", currents, **shown)
             names.append("field.png")
         # at points between rays the field needs a smooth body
         elif isinstance(of, RayFan) and self.boundary != "pec" and not is_piecewise(of.body):
-            options: dict[str, Any] = {"wavenumber": self.wavenumber, "boundary": self.boundary, "order": ORDER}
-            options |= {"wave": self.told(far.unit), "name": name}
-            plotting.surface_field_picture(output / "field.png", of, backend=backend, dpi=DPI, **options)
+            plotting.surface_field_picture(folder / "field.png", of, **self.asked, **shown)
             names.append("field.png")
         return names
-
-
-def _place(of: RayFan | Solution) -> str:
-    """The incident wave, in words."""
-    return incident_words(of.line.source if isinstance(of, RayFan) else PlaneWave(of.directions[0]))
-
-
-def _off(far: FarField) -> str:
-    """How large the error of |f| is, in words; nothing where it is not known."""
-    known = far.error[np.isfinite(far.error)]
-    return f"; error {np.median(known):.1g} {far.unit} in the median" if len(known) else ""
-
-
-def _visible(piece: FarField) -> bool:
-    """Whether a field has a value that can be drawn in decibels."""
-    return bool(np.any(np.isfinite(piece.total) & (piece.total != 0)))
-
-
-def _finite(value: Any) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 def job(
@@ -344,29 +331,22 @@ def job(
         raise InvalidInputError("--wavenumber is for rays of constant speed; leave out --speed, or the field")
     if direction is None:
         raise InvalidInputError(f"the field of --wavenumber is that of a plane wave; --source is {REMEDY}")
-    k, hertz = asked_wavenumber(wavenumber, frequency, wavelength, sound_speed)
+    k, hertz, cure = asked_wavenumber(wavenumber, frequency, wavelength, sound_speed)
     d = unit_direction(direction)
-    targets = tuple(parse_target(text, d) for text in observe or [_own_cut(d)])
+    # the cut through the direction of the wave; of one along z that of phi = 0
+    azimuth = 0.0 if np.hypot(d[0], d[1]) < 1e-9 else np.degrees(np.arctan2(d[1], d[0]))
+    targets = tuple(parse_target(text, d) for text in observe or [f"cut:{azimuth:.10g}"])
     if sum(target.kind == "grid" for target in targets) > 1:
         raise InvalidInputError("--observe names several grids; give one, far.ffe holds no more")
     kind = _boundary(boundary or "soft")
     unit = "m" if wavenumber is None else None
-    ((option, text),) = ((name, value) for name, value in zip(WAVES, given, strict=True) if value is not None)
-    found = Job(k, kind, targets, unit, hertz, _components(polarisation, kind), cure_of(option, text, hertz))
+    if polarisation is not None and kind != "pec":
+        raise InvalidInputError("--polarisation is of a conductor; give it with --boundary pec")
+    shown = each_once("--polarisation", polarisation or "VV,HH", POLARISATIONS)
+    components = tuple(POLARISATIONS[name] for name in shown)
+    found = Job(k, kind, targets, unit, hertz, components, cure)
     found.check_count()
     return found
-
-
-def _components(polarisation: str | None, boundary: BoundaryLike) -> tuple[str, ...]:
-    """Components that pictures show."""
-    if polarisation is None:
-        return ("tt", "pp")
-    names = [name.strip().upper() for name in polarisation.split(",")]
-    if boundary != "pec":
-        raise InvalidInputError("--polarisation is of a conductor; give it with --boundary pec")
-    if not set(names) <= set(POLARISATIONS) or len(set(names)) < len(names):
-        raise InvalidInputError(f"--polarisation {polarisation!r}: give some of {', '.join(POLARISATIONS)}, each once")
-    return tuple(POLARISATIONS[name] for name in names)
 
 
 def _boundary(text: str) -> BoundaryLike:
@@ -434,22 +414,3 @@ def _numbers(text: str, rest: str, count: int) -> list[float]:
     if len(numbers) != count or not np.all(np.isfinite(numbers)):
         raise InvalidInputError(f"--observe {text!r} is unknown; give {FORMS}")
     return numbers
-
-
-def _own_cut(direction: FloatArray) -> str:
-    """The cut through the direction of the wave; φ = 0 if that is along z."""
-    level = np.hypot(direction[0], direction[1]) < 1e-9
-    return f"cut:{0.0 if level else np.degrees(np.arctan2(direction[1], direction[0])):.10g}"
-
-
-def _stated_error(far: FarField) -> dict[str, Any]:
-    """Rms and largest error of the field, and what tells it; None where it is not known."""
-    off = far.stated_error
-    if off is None:
-        return {"rms": None, "max": None, "by": None}
-    return {"rms": off[0], "max": off[1], "by": far.error_source}
-
-
-def _named(found: Validity) -> dict[str, float | None]:
-    """By name; None where there is no number."""
-    return {name: float(value) if np.isfinite(value) else None for name, value in found._asdict().items()}

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from creeping import plotting
 from creeping._typing import FloatArray
-from creeping.commands.body import write_tables
+from creeping.commands.body import Output, write_tables
 from creeping.commands.run_field import DPI, ORDER, Job
 from creeping.errors import InvalidInputError
 from creeping.field.body_currents import affordable
@@ -56,30 +55,12 @@ def parse_plane(text: str) -> Plane:
     return Plane(text, None if numbers is None else np.eye(3)[list(numbers)], step)
 
 
-def asked_planes(texts: Sequence[str] | None, job: Job | None) -> list[Plane]:
-    """Planes that are asked for.
-
-    Raises
-    ------
-    InvalidInputError
-        If there is no field to be shown on them.
-    """
-    planes = [parse_plane(text) for text in texts or ()]
-    if planes and job is None:
-        raise InvalidInputError("--plane needs --wavenumber or --frequency, which ask for the field")
-    return planes
-
-
 def write_planes(
     planes: Sequence[Plane],
     job: Job,
     source: RayFan | Solution,
-    output: Path,
-    name: str,
+    output: Output,
     progress: Callable[[str], None],
-    *,
-    pictures: bool,
-    formats: Sequence[str] = ("csv",),
 ) -> tuple[list[dict[str, Any]], list[str]]:
     """Compute fields on planes, by a fan or a solution, and write their files.
 
@@ -97,10 +78,10 @@ def write_planes(
         seconds = perf_counter() - started
         if job.unit:
             cut = replace(cut, field=replace(cut.field, length_unit=job.unit))
-        names += write_tables(output / stem, formats, cut, cut=cut)
-        if pictures and np.any(cut.field.ok):
-            title = f"{name}\n{job.told(cut.field.length_unit)}, {cut.field.boundary}"
-            plotting.field_cut_picture(output / f"{stem}.png", cut, error=True, title=title, dpi=DPI)
+        names += write_tables(output.folder / stem, output.formats, cut, cut=cut)
+        if output.pictures and np.any(cut.field.ok):
+            title = f"{output.name}\n{job.told(cut.field.length_unit)}, {cut.field.boundary}"
+            plotting.field_cut_picture(output.folder / f"{stem}.png", cut, error=True, title=title, dpi=DPI)
             names.append(f"{stem}.png")
         entries.append(_entry(plane, cut) | {"seconds": round(seconds, 2)})
     return entries, names
@@ -108,10 +89,8 @@ def write_planes(
 
 def _options(plane: Plane, job: Job, source: RayFan | Solution) -> dict[str, Any]:
     """Arguments of `field_cut`, and of `cut_grid`."""
-    options: dict[str, Any] = {"step": plane.step}
-    if isinstance(source, RayFan):
-        options |= {"wavenumber": job.wavenumber, "boundary": job.boundary, "order": ORDER}
-    return options if plane.axes is None else options | {"across": plane.axes[0], "up": plane.axes[1]}
+    axes = {} if plane.axes is None else {"across": plane.axes[0], "up": plane.axes[1]}
+    return (job.asked if isinstance(source, RayFan) else {}) | axes | {"step": plane.step}
 
 
 def _polarisation(job: Job) -> dict[str, Any]:

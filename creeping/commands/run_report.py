@@ -1,32 +1,29 @@
-"""What one ``creeping run`` says and writes. Part of the command line."""
+"""What one ``creeping run`` says and writes, of rays and of bodies without them. Part of the command line."""
 
+import time
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from creeping import files, plotting
+from creeping._progress import Progress
 from creeping._version import __version__
-from creeping.commands.body import write_tables
-
-DPI = 200
-"""Of pictures."""
-
-
-def asked_wave(direction: Sequence[float] | None, source: Sequence[float] | None) -> Any:
-    """The incident wave of ``--direction`` or ``--source``.
-
-    Raises
-    ------
-    InvalidInputError
-        If neither is given, or its numbers are no direction or place.
-    """
-    from creeping.errors import InvalidInputError
-    from creeping.geometry.incident import PlaneWave, PointSource
-
-    if source is not None:
-        return PointSource(source)
-    if direction is None:
-        raise InvalidInputError("give --direction X Y Z, where a plane wave travels, or --source X Y Z, a point source")
-    return PlaneWave(direction)
+from creeping.commands.body import Output, write_tables
+from creeping.commands.forecast import boundary_words
+from creeping.commands.resuming import Unfinished, kept
+from creeping.commands.run_field import DPI, Job
+from creeping.commands.run_plane import Plane, plane_words, write_planes
+from creeping.commands.wave import frequency_words
+from creeping.errors import InvalidInputError
+from creeping.field.validity_range import Validity, validity_words
+from creeping.geometry.arguments import rays_refused
+from creeping.geometry.parts import why_no_rays
+from creeping.geometry.piecewise import is_piecewise
+from creeping.rays.status import RayStatus
+from creeping.rays.uncertain_body import body_uncertainty
 
 
 def wave_entry(source: Any) -> dict[str, list[float]]:
@@ -37,11 +34,6 @@ def wave_entry(source: Any) -> dict[str, list[float]]:
 
 def summary_of(body: str, speed: str | None, line: Any, carrier: Any, fan: Any, curves: list[Any]) -> dict[str, Any]:
     """What the summary file holds."""
-    import numpy as np
-
-    from creeping.geometry.piecewise import is_piecewise
-    from creeping.rays.status import RayStatus
-
     summary: dict[str, Any] = {
         "body": body,
         "speed": speed,
@@ -72,84 +64,42 @@ def summary_of(body: str, speed: str | None, line: Any, carrier: Any, fan: Any, 
         }
     if is_piecewise(fan.body):
         summary["losses"] = fan.losses()._asdict()
-    summary |= _of_the_body(fan)
+    # how well a body from a file is known, and what that does to its rays
+    if getattr(fan.body, "fit", None) is not None:
+        error = body_uncertainty(fan)
+        summary |= {
+            "fit": fan.body.fit.to_json(),
+            "verdict": fan.body.quality.verdict,
+            "repairs": list(fan.body.repairs),
+            "error_of_body": None if error is None else asdict(error),
+        }
     return summary
 
 
-def _of_the_body(fan: Any) -> dict[str, Any]:
-    """How well a body from a file is known, and what that does to its rays; nothing for other bodies."""
-    from dataclasses import asdict
+def write_results(line: Any, fan: Any, curves: list[Any], output: Output, **wave: Any) -> tuple[list[str], str | None]:
+    """Write data files and pictures; their names, and what drew the pictures.
 
-    from creeping.rays.uncertain_body import body_uncertainty
-
-    fit = getattr(fan.body, "fit", None)
-    if fit is None:
-        return {}
-    error = body_uncertainty(fan)
-    return {
-        "fit": fit.to_json(),
-        "verdict": fan.body.quality.verdict,
-        "repairs": list(fan.body.repairs),
-        "error_of_body": None if error is None else asdict(error),
-    }
-
-
-def write_results(
-    output: Path,
-    line: Any,
-    fan: Any,
-    curves: list[Any],
-    backend: str | None,
-    formats: Sequence[str] = ("csv",),
-    **wave: Any,
-) -> tuple[list[str], str | None]:
-    """Write data files and pictures, none without a backend; their names, and what drew the pictures.
-
-    ``wave`` is what pictures are told besides: the body's name, wavenumber and boundary.
+    ``wave`` is what pictures are told besides: wavenumber and boundary.
     """
-    from creeping import files, plotting
-    from creeping.errors import InvalidInputError
-
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InvalidInputError(f"cannot make the folder {output}: {error}; choose another with -o") from error
+    folder = output.folder
     # pictures last: a graphics driver that ends the process shall not take the numbers with it
-    files.write_vtp(output / "line.vtp", line=line)
-    files.write_vtp(output / "rays.vtp", fan=fan)
-    files.write_vtp(output / "curves.vtp", curves=curves)
+    files.write_vtp(folder / "line.vtp", line=line)
+    files.write_vtp(folder / "rays.vtp", fan=fan)
+    files.write_vtp(folder / "curves.vtp", curves=curves)
     tables: dict[str, tuple[str, Any]] = {"line": ("line", line), "rays": ("fan", fan), "curves": ("curves", curves)}
     for name, (kind, what) in tables.items():
-        write_tables(output / name, formats, what, **{kind: what})
-    names, drawn_by = [f"{n}.{kind}" for kind in ("vtp", *formats) for n in tables], None
-    if backend is not None:
-        drawn_by = plotting.picture(output / "rays.png", line, fan, curves, backend=backend, dpi=DPI, **wave)
-        plotting.parameter_picture(output / "parameters.png", line, fan, curves, dpi=DPI, **wave)
+        write_tables(folder / name, output.formats, what, **{kind: what})
+    names, drawn_by = [f"{n}.{kind}" for kind in ("vtp", *output.formats) for n in tables], None
+    if output.pictures:
+        wave["name"] = output.name
+        drawn_by = plotting.picture(folder / "rays.png", line, fan, curves, backend=output.backend, dpi=DPI, **wave)
+        plotting.parameter_picture(folder / "parameters.png", line, fan, curves, dpi=DPI, **wave)
         names = ["rays.png", "parameters.png", *names]
     return [*names, "summary.json"], drawn_by
 
 
-def _wave(field: dict[str, Any]) -> str:
-    """Wavenumber, and the frequency that was asked for."""
-    from creeping.commands.wave import frequency_words
-
-    told = f"k = {field['wavenumber']:g}"
-    return told if field["frequency"] is None else f"{frequency_words(field['frequency'])}, {told}"
-
-
-def _level(field: dict[str, Any]) -> str:
-    """Largest cross section in decibels."""
-    if field["largest_db"] is None:
-        return ""
-    return f" ({field['largest_db']:.2f} {'dBsm' if field['unit'] == 'm' else 'dB re 1 L^2'})"
-
-
 def readable(summary: dict[str, Any], output: Path) -> str:
     """The summary as a person reads it."""
-    from creeping.commands.forecast import boundary_words
-    from creeping.commands.run_plane import plane_words
-    from creeping.field.validity_range import Validity, validity_words
-
     name, place = ("d", summary["direction"]) if "direction" in summary else ("source at", summary["source"])
     equals = " =" if name == "d" else ""
     kind = f", {boundary_words(summary['field']['boundary'])}" if "field" in summary else ""
@@ -191,9 +141,12 @@ def readable(summary: dict[str, Any], output: Path) -> str:
             )
     if "field" in summary:
         f = summary["field"]
+        hertz = "" if f["frequency"] is None else f"{frequency_words(f['frequency'])}, "
+        unit = "dBsm" if f["unit"] == "m" else "dB re 1 L^2"
+        level = "" if f["largest_db"] is None else f" ({f['largest_db']:.2f} {unit})"
         rows.append(
-            f"field: {_wave(f)}, {f['boundary']}, {f['directions']} directions, "
-            f"|f| up to {f['largest']:.4g} {f['unit']}{_level(f)}, {f['unresolved']} unresolved; {f['seconds']:.1f} s"
+            f"field: {hertz}k = {f['wavenumber']:g}, {f['boundary']}, {f['directions']} directions, |f| up to "
+            f"{f['largest']:.4g} {f['unit']}{level}, {f['unresolved']} unresolved; {f['seconds']:.1f} s"
         )
         k_rho, transverse = f["validity"]["least_k_rho"], f["validity"]["largest_transverse"]
         if k_rho is not None:
@@ -211,3 +164,54 @@ def readable(summary: dict[str, Any], output: Path) -> str:
     rows.append(f"{summary['iso_phase_curves']} iso-phase curves; {drawn}")
     rows.append(f"{summary['seconds']:.1f} s; results in {output}/: {', '.join(summary['files'])}")
     return "\n".join(rows)
+
+
+def run_solved(
+    shape: Any,
+    job: Job | None,
+    incident: Any,
+    planes: Sequence[Plane],
+    output: Output,
+    progress: Progress,
+    unfinished: Unfinished,
+) -> dict[str, Any]:
+    """Write the far field of a plane wave on a body without rays; returns the summary.
+
+    Raises
+    ------
+    InvalidInputError
+        If no field is asked for, or one of a point source.
+    """
+    if job is None:
+        raise InvalidInputError(f"{rays_refused(shape)}; give --wavenumber, --frequency or --wavelength")
+    if not hasattr(incident, "direction"):
+        raise InvalidInputError(f"--source is of bodies with rays; {why_no_rays(shape)}: give --direction")
+    started = time.perf_counter()
+    with kept(unfinished, progress.message):
+        solution, far, seconds = job.solved(shape, incident.direction, progress, unfinished)
+        progress("pictures and files" if output.pictures else "files")
+        summary: dict[str, Any] = {"body": unfinished.asked["body"], "version": __version__, **wave_entry(incident)}
+        summary |= {"rays": None, "without_rays": why_no_rays(shape), "nodes": solution.nodes}
+        summary["field"], names = job.write(far, solution, output)
+        summary["planes"], more = write_planes(planes, job, solution, output, progress)
+        summary["field"]["seconds"], summary["files"] = seconds, [*names, *more, "summary.json"]
+        summary["seconds"] = round(time.perf_counter() - started, 2)
+        unfinished.write_summary(summary, complete=True)
+    return summary
+
+
+def readable_solved(summary: dict[str, Any], output: Path) -> str:
+    """The summary in a few lines."""
+    field = summary["field"]
+    error = field["error"]
+    told = "" if error["rms"] is None else f"; error by {error['by']} {error['rms']:.2g} {field['unit']} rms"
+    return "\n".join(
+        [
+            f"no creeping rays: {summary['without_rays']}",
+            f"{field['boundary']} far field in {field['directions']} directions by the integral equation between "
+            f"{summary['nodes']} nodes, |f| up to {field['largest']:.4g} {field['unit']}{told}, "
+            f"{field['unresolved']} unresolved",
+            *map(plane_words, summary["planes"]),
+            f"{len(summary['files'])} files in {output} ({', '.join(summary['files'])}), {summary['seconds']:.1f} s",
+        ]
+    )

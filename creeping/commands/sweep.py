@@ -12,16 +12,13 @@ from typing import Annotated, Any
 from cyclopts import Group, Parameter
 
 from creeping._progress import Progress
-from creeping.commands.body import FileOptions, is_file, parse_body
+from creeping.commands import options
+from creeping.commands.body import flow_of, is_file, parse_body
 
-PARTIAL, ALL_FAILED = 4, 3
-"""Exit codes: of a sweep that --resume would go on with, for what is missing or failed; of one without results."""
-PILOT = 2
-"""Tasks by which a sweep is timed; the first may have to compile."""
+_workers = Group("Workers")
+
 LARGE = 1800.0
 """Seconds left from which a sweep is shared among the cores by itself."""
-_output = Group("Output")
-_workers = Group("Workers")
 
 
 def sweep(
@@ -30,7 +27,9 @@ def sweep(
     *,
     output: Annotated[
         Path | None,
-        Parameter(name=["-o", "--output"], group=_output, help="Folder for the results (zarr); else of the study."),
+        Parameter(
+            name=["-o", "--output"], group=options.OUTPUT, help="Folder for the results (zarr); else of the study."
+        ),
     ] = None,
     resume: Annotated[
         bool,
@@ -45,11 +44,9 @@ def sweep(
         int | None,
         Parameter(group=_workers, help="Worker processes on this machine; one for each core if it takes long."),
     ] = None,
-    cache: Annotated[bool, Parameter(help="Keep the phase map for the next run.")] = True,
+    cache: options.Cache = True,
     example: Annotated[bool, Parameter(negative="", help="Print a study file to start from.")] = False,
-    json_: Annotated[
-        bool, Parameter(name="--json", negative="", group=_output, help="Print the summary as JSON.")
-    ] = False,
+    json_: options.Json = False,
 ) -> int:
     """Run the sweep of a study file; interrupted, it can be resumed.
 
@@ -102,8 +99,8 @@ def sweep(
         summary["resume"] = shlex.join(again)
     print(json.dumps(summary, indent=1) if json_ else _readable(summary))
     if failed == len(plan.incidences):
-        return ALL_FAILED
-    return PARTIAL if failed or not complete else 0
+        return 3
+    return 4 if failed or not complete else 0
 
 
 def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Progress) -> tuple[Any, Any]:
@@ -122,7 +119,7 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Prog
     text = str(read.folder / read.body) if is_file(read.body, read.folder) else read.body
     progress("body")
     body = parse_body(
-        text, read.speed, options=FileOptions(units=read.units, **read.file), cache=cache, progress=progress
+        text, read.speed, options=options.FileOptions(units=read.units, **read.file), cache=cache, progress=progress
     )
     request = read.request_for(body)
     if request.wavenumbers:
@@ -149,20 +146,19 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Prog
 
 
 def _flow(read: Any, body: Any, request: Any, cache: bool, progress: Any) -> Any:
-    import creeping as cr
+    from creeping import build_phase_map
     from creeping.geometry.parts import why_no_rays
     from creeping.sweeping.solved_fields import NoFlow
+    from creeping.sweeping.sweeper import outputs_of
 
     if why_no_rays(body):
         return NoFlow(body)
-    if read.flow == "direct":
-        # errors of the steps add up and grow along the rays
-        return cr.DirectFlow(body, rtol=min(max(1e-4 * read.tolerance, 1e-13), 1e-8))
-    from creeping.sweeping.sweeper import outputs_of
-
-    asked = {"length": request.length, "n_steps": outputs_of(body, request), "tolerance": read.tolerance}
-    asked |= {"n_rays": len(read.incidences) * request.n_rays, "cache": cache, "progress": progress}
-    return cr.build_phase_map(body, **asked) if read.flow == "map" else cr.choose_flow(body, **asked)
+    asked = {"length": request.length, "n_steps": outputs_of(body, request), "cache": cache, "progress": progress}
+    rays = len(read.incidences) * request.n_rays
+    if read.flow == "map":
+        # tuned for all rays of the sweep
+        return build_phase_map(body, tolerance=read.tolerance, n_rays=rays, **asked)
+    return flow_of(read.flow, body, read.tolerance, n_rays=rays, **asked)
 
 
 def _run(plan: Any, store: Any, scheduler: str | None, workers: int | None, meter: Progress) -> tuple[bool, int]:
@@ -171,12 +167,13 @@ def _run(plan: Any, store: Any, scheduler: str | None, workers: int | None, mete
     from creeping.sweeping.run import fill
 
     with _stopping(meter) as asked:
-        options: dict[str, Any] = {"progress": meter.told, "stop": asked.is_set}
+        told: dict[str, Any] = {"progress": meter.told, "stop": asked.is_set}
         if scheduler is None and workers is None:
-            complete = fill(plan, store, most=PILOT, **options)
+            # two tasks time a sweep: the first may have to compile
+            complete = fill(plan, store, most=2, **told)
             # cores, unless the user has fewer in mind
             if complete or asked.is_set() or meter.left() < LARGE or thread_count() == 1:
-                return complete or fill(plan, store, **options), meter.done_now
+                return complete or fill(plan, store, **told), meter.done_now
             workers = thread_count()
             meter.note(f"about {meter.left():.0f} s are left: sharing them among {workers} worker processes")
         if workers is not None:
@@ -187,8 +184,8 @@ def _run(plan: Any, store: Any, scheduler: str | None, workers: int | None, mete
 
             meter.note(f"starting {workers} worker processes")
             with local_client(workers) as client:
-                return fill(plan, store, client=client, **options), meter.done_now
-        return fill(plan, store, client=scheduler, **options), meter.done_now
+                return fill(plan, store, client=client, **told), meter.done_now
+        return fill(plan, store, client=scheduler, **told), meter.done_now
 
 
 @contextmanager

@@ -15,11 +15,10 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
-
-from cyclopts import Parameter
+from typing import Any
 
 from creeping._version import __version__
+from creeping.commands import options
 
 LIBRARIES = ("numpy", "scipy", "numba", "matplotlib", "pyvista", "vtk", "trimesh")
 OPTIONAL = {
@@ -30,7 +29,6 @@ OPTIONAL = {
     "dask": "sweeps on clusters",
     "viser": "creeping explore",
 }
-Json = Annotated[bool, Parameter(name="--json", negative="", help="Print as JSON.")]
 
 
 def versions() -> dict[str, str | None]:
@@ -58,36 +56,28 @@ def plain_numbers(text: str) -> str:
     return re.sub(r"-?0x[01]\.?[0-9a-f]*p[+-]?\d+", lambda found: repr(float.fromhex(found[0])), text)
 
 
-def _sources() -> dict[str, str]:
-    """Names of the files that fitted bodies were made from, by the names of the fits; of those that know."""
-    from scatterers.spline import cache as _fit_cache
-
-    kept = ((file.stem, _fit_cache.load(file.parent, file.stem)) for file in _fits())
-    return {stem: str(found[1]["source"]) for stem, found in kept if found and found[1].get("source")}
-
-
-def list_maps(*, json_: Json = False) -> int:
+def list_maps(*, json_: options.Json = False) -> int:
     """List the stored maps and fitted bodies."""
     from creeping.errors import CreepingError
     from creeping.phaseflow import cache as caching
     from creeping.storage import folder as storing
+    from scatterers.spline import cache as _fit_cache
 
-    rows, sources = [], _sources()
+    # names of the files that fitted bodies were made from, by the names of the fits; of those that know
+    loaded = ((file.stem, _fit_cache.load(file.parent, file.stem)) for file in _fits())
+    sources = {stem: str(found[1]["source"]) for stem, found in loaded if found and found[1].get("source")}
+    rows: list[dict[str, Any]] = []
     for folder in _stored():
-        size = sum(f.stat().st_size for f in folder.iterdir())
+        size, rms = sum(f.stat().st_size for f in folder.iterdir()), None
         try:
             content = storing.read_manifest(folder)
-            rows.append(
-                {
-                    "map": folder.name,
-                    "MB": round(size / 1e6, 1),
-                    "body": _readable(content["body"], sources),
-                    "error": content["error"][0],
-                }
-            )
+            body, rms = plain_numbers(str(content["body"])), content["error"][0]
+            # the fit of a file is told by the name of the file
+            body = next((f"{name}: {body}" for stem, name in sources.items() if stem in body), body)
         except CreepingError as error:
-            rows.append({"map": folder.name, "MB": round(size / 1e6, 1), "body": f"unreadable: {error}", "error": None})
-    fits = [
+            body = f"unreadable: {error}"
+        rows.append({"map": folder.name, "MB": round(size / 1e6, 1), "body": body, "error": rms})
+    fits: list[dict[str, Any]] = [
         {"fit": file.stem, "source": sources.get(file.stem), "MB": round(file.stat().st_size / 1e6, 1)}
         for file in _fits()
     ]
@@ -102,13 +92,6 @@ def list_maps(*, json_: Json = False) -> int:
         for row in fits:
             print(f"  {row['fit']}  {row['MB']:8.1f} MB  {row['source'] or ''}".rstrip())
     return 0
-
-
-def _readable(body: str, sources: dict[str, str]) -> str:
-    """A body in decimal numbers, and by the name of its file."""
-    text = plain_numbers(str(body))
-    name = next((name for stem, name in sources.items() if stem in text), None)
-    return text if name is None else f"{name}: {text}"
 
 
 def verify_maps() -> int:
@@ -131,11 +114,8 @@ def verify_maps() -> int:
     for file in _fits():
         whole = _fit_cache.load(file.parent, file.stem) is not None
         damaged += not whole
-        print(
-            f"ok       {file.stem}"
-            if whole
-            else f"DAMAGED  {file.stem}, or others can write it: it is fitted anew when it is asked for"
-        )
+        why = ", or others can write it: it is fitted anew when it is asked for"
+        print(f"ok       {file.stem}" if whole else f"DAMAGED  {file.stem}{why}")
     return 3 if damaged else 0
 
 
@@ -180,21 +160,14 @@ def _fits() -> list[Path]:
 
 def doctor() -> int:
     """Report versions, compiled kernels, graphics and the cache folder; exit code 3 if something is missing."""
-    import os
-    import platform
-    from importlib.metadata import PackageNotFoundError, version
-
     from creeping.phaseflow.cache import cache_folder
     from creeping.plotting import gl_available
 
-    print(f"creeping {__version__}, Python {platform.python_version()}, {os.cpu_count()} cores")
-    missing = 0
-    for name in (*LIBRARIES, *OPTIONAL):
-        try:
-            print(f"  {name} {version(name)}")
-        except PackageNotFoundError:
-            missing += name not in OPTIONAL
-            print(f"  {name} is not installed" + (f" (needed for {OPTIONAL[name]})" if name in OPTIONAL else ""))
+    there = versions()
+    print(f"creeping {there.pop('creeping')}, Python {there.pop('python')}, {os.cpu_count()} cores")
+    for name, found in there.items():
+        needed = f" (needed for {OPTIONAL[name]})" if name in OPTIONAL else ""
+        print(f"  {name} {found}" if found else f"  {name} is not installed{needed}")
     started = time.perf_counter()
     import creeping.geodesics.kernels.integrator  # noqa: F401
 
@@ -206,7 +179,7 @@ def doctor() -> int:
     print(
         f"  cache: {root} ({'writable' if os.access(nearest, os.W_OK) else 'NOT writable: maps are rebuilt each time'})"
     )
-    return 3 if missing else 0
+    return 3 if any(there[name] is None for name in LIBRARIES) else 0
 
 
 def main(first: str, folder: str, digest: str) -> None:

@@ -22,8 +22,8 @@ def frequency_words(hertz: float) -> str:
 
 def asked_wavenumber(
     wavenumber: float | None, frequency: str | None, wavelength: str | None, sound_speed: float | None
-) -> tuple[float, float | None]:
-    """The one wavenumber that is asked for, and its frequency, Hz, if it was not given as a wavenumber.
+) -> tuple[float, float | None, str]:
+    """The one wavenumber that is asked for, its frequency, Hz, if it was not given as a wavenumber, and `cure_of` it.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def asked_wavenumber(
         if sound_speed is not None:
             raise InvalidInputError("--sound-speed goes with --frequency; --wavenumber needs none")
         try:
-            return checked(wavenumber, 2), None
+            return checked(wavenumber, 2), None, cure_of(option, value, None)
         except CreepingError as error:
             raise InvalidInputError(f"--{error}") from error
     if wavelength is not None and not wavelength.strip().endswith("m"):
@@ -48,7 +48,8 @@ def asked_wavenumber(
         found = wavenumber_of(value, sound_speed=sound_speed)
         if not isinstance(found, float):
             raise InvalidInputError(f"{value!r} is a range; `creeping rcs` and `creeping ts` take those")
-        return checked(found, 2), float(hertz_of(found, sound_speed=sound_speed))
+        hertz = float(hertz_of(found, sound_speed=sound_speed))
+        return checked(found, 2), hertz, cure_of(option, value, hertz)
     except InvalidInputError as error:
         raise InvalidInputError(f"{option}: {error}") from error
 

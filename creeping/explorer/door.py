@@ -30,9 +30,6 @@ from websockets.http11 import Request, Response
 from creeping._typing import Any
 from creeping.errors import CreepingError
 
-LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
-LARGEST = 1_000_000
-"""Bytes of a message from a page: a slider's are hundreds."""
 CLIENTS = 16
 """Pages that may be open."""
 _PATCHING = Lock()
@@ -45,6 +42,8 @@ class Door:
     ----------
     clients : callable
         Number of connections that are open.
+    title : str
+        Of the page, in place of the library's.
 
     Attributes
     ----------
@@ -52,13 +51,13 @@ class Door:
         Random; to know it is to be let in.
     """
 
-    def __init__(self, clients: Callable[[], int]) -> None:
+    def __init__(self, clients: Callable[[], int], title: str) -> None:
         self.token = secrets.token_urlsafe(24)
-        self._clients = clients
+        self._clients, self._title = clients, title
 
     def refusal(self, request: Request, port: int) -> str:
         """Why a request is not let in; nothing if it is."""
-        own = {f"{name}:{port}" for name in LOOPBACK}
+        own = {f"{name}:{port}" for name in ("127.0.0.1", "localhost", "[::1]")}
         hosts, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
         if len(hosts) != 1 or hosts[0].lower() not in own:
             return "this page is for this machine, by its own name"
@@ -74,10 +73,6 @@ class Door:
         """Whether the token stands in the address of a request that is no upgrade."""
         given = parse_qs(urlsplit(request.path).query).get("token", [])
         return not upgrades(request) and len(given) == 1 and self._is_token(given[0])
-
-    def cookie(self, port: int) -> str:
-        """Header that has a browser bring the token from there on."""
-        return f"{_name(port)}={self.token}; Path=/; HttpOnly; SameSite=Strict"
 
     def _brought(self, request: Request, port: int) -> bool:
         try:
@@ -112,12 +107,25 @@ class Door:
                     body = reason.encode()
                     headers = Headers({"Content-Type": "text/plain", "Content-Length": str(len(body))})
                     return Response(http.HTTPStatus.FORBIDDEN.value, "Forbidden", headers, body)
+                index = request.path.partition("?")[0] in ("/", "/index.html")
+                if index and "Accept-Encoding" in request.headers:
+                    # to be given its title it must come uncompressed
+                    del request.headers["Accept-Encoding"]
                 found: Response | None = process_request(connection, request)
-                if found is not None and self.opened_by(request):
-                    found.headers["Set-Cookie"] = self.cookie(port)
+                if found is None:
+                    return None
+                if index and found.body and found.headers.get("Content-Type", "").startswith("text/"):
+                    found.body = with_title(bytes(found.body).decode(), self._title).encode()
+                    del found.headers["Content-Length"]
+                    found.headers["Content-Length"] = str(len(found.body))
+                if self.opened_by(request):
+                    # a browser brings the token from there on
+                    cookie = f"{_name(port)}={self.token}; Path=/; HttpOnly; SameSite=Strict"
+                    found.headers["Set-Cookie"] = cookie
                 return found
 
-            return serve(*arguments, process_request=checked, max_size=LARGEST, **options)
+            # bytes of a message from a page: a slider's are hundreds
+            return serve(*arguments, process_request=checked, max_size=1_000_000, **options)
 
         with _PATCHING:
             websocket_server.serve = guarded  # type: ignore[assignment, misc]
@@ -148,3 +156,8 @@ def leading_to(address: str) -> Iterator[str]:
 def _name(port: int) -> str:
     """Of the cookie: cookies do not tell ports apart."""
     return f"creeping-{port}"
+
+
+def with_title(page: str, title: str) -> str:
+    """A page of viser with another title."""
+    return page.replace("<title>Viser</title>", f"<title>{html.escape(title)}</title>", 1)

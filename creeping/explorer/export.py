@@ -4,13 +4,12 @@ import html
 import os
 from pathlib import Path
 
+from creeping.explorer.door import with_title
+from creeping.explorer.frames import Refined, preview_of, refined_view, step_of
 from creeping.explorer.page import LocalServer
-from creeping.explorer.preview import Preview, preview_of, step_of
-from creeping.explorer.refined import Refined, refined_view
+from creeping.explorer.panel import cut_svg, legend, plane_svg, refined_text, validity_text
 from creeping.explorer.request import ViewRequest
 from creeping.explorer.scene import DrawnBody, Scene
-from creeping.explorer.svg import cut_svg, plane_svg
-from creeping.explorer.text import legend, refined_text, validity_text, with_title
 from creeping.explorer.wave import fitted_span
 from creeping.files import write_text
 from creeping.rays.transport import Flow
@@ -68,20 +67,16 @@ def page_of(flow: Flow, request: ViewRequest, name: str | None = None) -> tuple[
         page = server.scene.as_html()
     finally:
         server.stop()
-    return with_panel(page, name or repr(flow.body), frame, found, legend(frame, span, still=True)), found
-
-
-def with_panel(page: str, title: str, frame: Preview, found: Refined, bar: str) -> str:
-    """The page of a scene with the numbers and plane pictures beside it."""
-    words = refined_text(found)
+    title, words = name or repr(flow.body), refined_text(found)
     if frame.validity is not None:
         words = f"{validity_text(frame.validity).replace('**', '')}\n\n{words}"
     text = "".join(f"<p>{html.escape(part)}</p>" for part in words.split("\n\n"))
-    angles = f"theta {found.request.theta:.1f}, phi {found.request.phi:.1f} degrees"
+    angles = f"theta {request.theta:.1f}, phi {request.phi:.1f} degrees"
+    # the numbers and plane pictures beside the scene
     panel = (
         f'<style>{STYLE}</style><aside id="creeping"><h1>{html.escape(title)}</h1><p>{angles}</p>{text}'
-        f"{bar}{plane_svg(found)}{cut_svg(found.request, found.cut_angles, found.far)}</aside>"
+        f"{legend(frame, span, still=True)}{plane_svg(found)}{cut_svg(request, found.cut_angles, found.far)}</aside>"
     )
     page = with_title(page, title)
     end = page.rindex("</body>")
-    return page[:end] + panel + page[end:]
+    return page[:end] + panel + page[end:], found

@@ -28,12 +28,10 @@ import viser
 from creeping._typing import Any
 from creeping.errors import CreepingError
 from creeping.explorer.door import Door
-from creeping.explorer.preview import Preview, preview_of, step_of
-from creeping.explorer.refined import Refined, far_cut, refined_view
+from creeping.explorer.frames import Preview, Refined, far_cut, preview_of, refined_view, step_of
+from creeping.explorer.panel import cut_svg, legend, plane_svg, preview_plane_svg, preview_text, refined_text, wave_note
 from creeping.explorer.request import BOUNDARIES, RAYS, ViewRequest, angles, wave_scale
 from creeping.explorer.scene import DrawnBody, Paint, Scene, turned
-from creeping.explorer.svg import cut_svg, plane_svg, preview_plane_svg
-from creeping.explorer.text import legend, preview_text, refined_text, titled, wave_note
 from creeping.explorer.wave import Span, fitted_span
 from creeping.field.body_currents import expected_nodes
 from creeping.field.lit_ground import convex
@@ -46,13 +44,11 @@ REST = 0.4
 """Seconds for which the hand rests before work begins that would hold up its next move."""
 FOLLOWING = 4.0
 """Step of the far-field cut while the hand moves, degrees."""
-PACE, FOLLOWED = 0.25, 60_000
-"""Seconds between two such cuts at least, and nodes of the body's currents up to which they are made, in about half a
-second; beyond, the cut waits until the hand rests."""
+PACE = 0.25
+"""Seconds between two such cuts at least."""
 
 T = TypeVar("T")
 
-SHOWS = ("level", "wave")
 STEP = 30
 """Degrees between two pictures of a running wave."""
 PLAYING_PACE = 0.15
@@ -63,10 +59,10 @@ class LocalServer(viser.ViserServer):  # type: ignore[misc]
     """A quiet server for this machine alone."""
 
     def __init__(self, port: int, name: str = "creeping") -> None:
-        self.door = Door(lambda: len(self._websock_server._live_connections))
+        self.door = Door(lambda: len(self._websock_server._live_connections), name)
         # the address is shown by whoever starts it
         try:
-            with redirect_stdout(StringIO()), self.door.installed(), titled(name):
+            with redirect_stdout(StringIO()), self.door.installed():
                 super().__init__(HOST, port, label=name, verbose=False)
         except CreepingError:
             self.stop()
@@ -299,7 +295,10 @@ class Explorer:
             (frame, number), _ = taken
             request, began = frame.request, time.perf_counter()
             try:
-                if speed_of(self.flow.body) is not None or not self._follows(frame):
+                # of more nodes a cut takes more than half a second, and waits until the hand rests
+                if speed_of(self.flow.body) is not None or not len(frame.fan.points):
+                    continue
+                if expected_nodes(frame.fan, request.wavenumber) >= 60_000:
                     continue
                 # currents of a body that faces itself take seconds
                 method = "auto" if convex(frame.fan) else "rays"
@@ -316,10 +315,6 @@ class Explorer:
                 self.status.content = error_text(error)
             # the hand comes first: as long a rest as the work took
             time.sleep(max(PACE, time.perf_counter() - began))
-
-    def _follows(self, frame: Preview) -> bool:
-        """Whether the cut of a frame can be had while the hand moves."""
-        return len(frame.fan.points) > 0 and expected_nodes(frame.fan, frame.request.wavenumber) < FOLLOWED
 
     def _refine(self) -> None:
         """Follow up when the hand rests."""
@@ -420,7 +415,7 @@ class Player:
     def __init__(self, gui: Any, redraw: Callable[[], None], recolour: Callable[[], None]) -> None:
         self._redraw, self._recolour = redraw, recolour
         self.show = gui.add_dropdown(
-            "show", SHOWS, initial_value=SHOWS[0], hint="20 log10 |u|, or Re(u e^(-i omega t))"
+            "show", ("level", "wave"), initial_value="level", hint="20 log10 |u|, or Re(u e^(-i omega t))"
         )
         self.slider = gui.add_slider("phase, omega t (degrees)", 0, 360, STEP // 6, 0, disabled=True)
         self.play = gui.add_checkbox("play", False, disabled=True, hint="Let the wave run")

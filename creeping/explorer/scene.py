@@ -10,8 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from creeping._typing import Any, ComplexArray, FloatArray
-from creeping.explorer.preview import NOTHING, Preview, joined, outline
-from creeping.explorer.refined import Refined
+from creeping.explorer.frames import NOTHING, Preview, Refined, joined, outline
 from creeping.explorer.wave import (
     ENDED,
     LEVEL_COLOURS,
@@ -29,16 +28,10 @@ from creeping.geometry.surface import Surface, size
 from creeping.geometry.triangulation import Triangulation
 from creeping.plotting._drawing import shadow_view
 from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, RAY_COLOUR, STATUS_COLOURS, line_pieces
-from creeping.plotting.coupling_pictures import LEAST_SAMPLES, samples_a_wave
+from creeping.plotting.coloured_body import LEAST_SAMPLES, samples_a_wave
 
 CELLS = 44
 """Of the drawn body along each side of its box."""
-INSET = 0.004
-"""How much smaller the drawn body is, in body sizes."""
-CAMERA = 3.9
-"""Distance of the camera, in radii of the body's box."""
-WIDTHS = {"rays": 1.5, "levels": 2.0, "line": 4.0, "outline": 1.5}
-"""Of lines, in pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +68,8 @@ class DrawnBody:
 
     @property
     def inset(self) -> FloatArray:
-        """Vertices as drawn (n, 3)."""
-        return np.asarray(self.mesh.vertices - INSET * size(self.body) * self.normals)
+        """Vertices as drawn (n, 3), a little inside of the body."""
+        return np.asarray(self.mesh.vertices - 0.004 * size(self.body) * self.normals)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +136,7 @@ class Scene:
         """Start the camera on the shadow side."""
         toward = shadow_view(direction).toward
         self.server.initial_camera.look_at = self.model.centre
-        self.server.initial_camera.position = self.model.centre + CAMERA * self.model.radius * toward
+        self.server.initial_camera.position = self.model.centre + 3.9 * self.model.radius * toward
         self.server.initial_camera.fov = float(np.radians(40))
 
     def turn(self, direction: FloatArray) -> None:
@@ -241,7 +234,7 @@ class Scene:
             return
         paint = np.array(rgb(colours), dtype=np.uint8) if isinstance(colours, str) else LINEAR[colours]
         if handle is None:
-            width = WIDTHS[name.split("/")[0]]
+            width = {"rays": 1.5, "levels": 2.0, "line": 4.0, "outline": 1.5}[name.split("/")[0]]
             self._lines[name] = self.scene.add_line_segments(
                 f"/{name}", points, paint, thickness=width, thickness_units="screen"
             )

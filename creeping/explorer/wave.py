@@ -18,16 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from creeping._typing import ComplexArray, FloatArray
-from creeping.plotting.coupling_pictures import LEAST_SAMPLES, at_phase
+from creeping.plotting.coloured_body import LEAST_SAMPLES, at_phase
 from creeping.rays.fan import RayFan
 
 Bytes = NDArray[np.uint8]
-SAMPLES, MOST_SEGMENTS = 6.0, 60_000
-"""Points of a ray a wavelength, and segments of all rays up to which there are as many."""
 MOST, LEAST, STEP = 60.0, 10.0, 5.0
 """Largest and smallest range of the field's colours, and what its ends are multiples of, dB."""
-KEPT = 7.5
-"""By how much data may leave their range or fall short of it, dB, before it changes: it does not flicker."""
 ENDED = (150, 156, 162)
 """Colour where a ray has ended or no ray passes."""
 _SHARE = np.arange(256) / 255
@@ -64,7 +60,8 @@ def ray_wave(fan: RayFan, envelope: ComplexArray, levels: FloatArray, wavenumber
     if not rays:
         return None
     waves = wavenumber * float(fan.travel_time[1] - fan.travel_time[0]) / (2 * np.pi)
-    parts = max(1, min(int(np.ceil(SAMPLES * waves)), MOST_SEGMENTS // (rays * (steps - 1))))
+    # six points a wavelength, unless rays have too many segments
+    parts = max(1, min(int(np.ceil(6.0 * waves)), 60_000 // (rays * (steps - 1))))
     if parts < LEAST_SAMPLES * waves:
         return None
     slow = np.unwrap(np.angle(np.where(np.isfinite(envelope), envelope, 1.0)), axis=1)
@@ -159,7 +156,8 @@ def fitted_span(levels: FloatArray | None, before: Span | None = None) -> Span:
     if not len(finite):
         return before or (-50.0, 5.0)
     least, most = np.percentile(finite, [1.0, 99.0])
-    if before and abs(most - before[1]) < KEPT and abs(max(least, most - MOST) - before[0]) < KEPT:
+    # by so much data may leave their range or fall short of it: it does not flicker
+    if before and abs(most - before[1]) < 7.5 and abs(max(least, most - MOST) - before[0]) < 7.5:
         return before
     high = float(STEP * np.ceil(most / STEP))
     low = float(STEP * np.floor(max(least, high - MOST) / STEP))

@@ -15,7 +15,11 @@ The file's time factor is e^{+jωt} and ours e^{-iωt}: numbers are conjugated, 
 from __future__ import annotations
 
 import os
+import re
+from array import array
 from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,42 +28,25 @@ from creeping._typing import ArrayLike, ComplexArray, FloatArray
 from creeping._version import __version__
 from creeping.errors import InvalidInputError
 from creeping.field.far_result import turned_to_azimuth
+from creeping.field.frequency import frequency, wavenumber
+from creeping.files.measured import lines_of
 from creeping.files.tables import angles_of
-from creeping.geometry.directions import unit_direction
+from creeping.geometry.directions import directions_from_angles, unit_direction
 from creeping.storage.atomic import written_aside
 
 if TYPE_CHECKING:
     from creeping.field.far_result import FarField
-import re
-from array import array
-from dataclasses import dataclass, field
-from io import TextIOWrapper
-from pathlib import Path
-from typing import TextIO
 
-from creeping.field.frequency import wavenumber
-from creeping.storage.reading import opened
-
-LIGHT = 299792458.0
-"""Speed of light, m/s."""
-_QUANTITIES = ("Re(Etheta)", "Im(Etheta)", "Re(Ephi)", "Im(Ephi)", "RCS(Theta)", "RCS(Phi)", "RCS(Total)")
-_COLUMNS = "#" + "".join(f"{name:>26}" for name in ('"Theta"', '"Phi"', *(f'"{name}"' for name in _QUANTITIES)))
-
-MOST_BYTES = 512_000_000
 MOST_BLOCKS = 10_000
 MOST_ROWS, MOST_KEYS = 5_000_000, 100
 """Rows of a file, and keys of a block."""
-LONGEST = 4096
-"""Characters of a line."""
 COLUMNS = ("Theta", "Phi", "Re(Etheta)", "Im(Etheta)", "Re(Ephi)", "Im(Ephi)")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
-_WHOLE = re.compile(r"\d{1,9}", re.ASCII)
 
 
 def grid_directions(theta: ArrayLike, phi: ArrayLike) -> FloatArray:
     """Unit directions of a grid in radians, φ the faster: (t,), (p,) -> (t p, 3)."""
-    t, p = (grid.ravel() for grid in np.meshgrid(theta, phi, indexing="ij"))
-    return np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1)
+    return directions_from_angles(*(grid.ravel() for grid in np.meshgrid(theta, phi, indexing="ij")))
 
 
 def write_ffe(
@@ -155,7 +142,7 @@ def _lines(far: FarField, theta: FloatArray, phi: FloatArray, direction: ArrayLi
             yield f"** incident E along the {name} unit vector of the incident wave's direction of travel, 1 V/m"
         yield f"#Configuration Name: incident_{name}"
         yield "#Request Name: FarField"
-        yield f"#Frequency: {far.wavenumber * LIGHT / (2 * np.pi):.14E}"
+        yield f"#Frequency: {float(frequency(far.wavenumber)):.14E}"
         yield "#Coordinate System: Spherical"
         yield f"#No. of Theta Samples: {len(theta)}"
         yield f"#No. of Phi Samples: {len(phi)}"
@@ -164,7 +151,8 @@ def _lines(far: FarField, theta: FloatArray, phi: FloatArray, direction: ArrayLi
             source = np.degrees(angles_of(-unit_direction(direction)))
             yield f"#Incident Wave Direction: ({source[0]:.10g}, {source[1]:.10g})"
         yield "#No. of Header Lines: 1"
-        yield _COLUMNS
+        names = (f'"{name}"' for name in (*COLUMNS, "RCS(Theta)", "RCS(Phi)", "RCS(Total)"))
+        yield "#" + "".join(f"{name:>26}" for name in names)
         fields = _components(far, theta, phi, number)
         # theta runs first
         for j, i in np.ndindex(len(phi), len(theta)):
@@ -210,8 +198,7 @@ class FfeBlock:
     @property
     def directions(self) -> FloatArray:
         """Unit directions (n, 3)."""
-        t, p = np.radians(self.theta), np.radians(self.phi)
-        return np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], axis=-1)
+        return directions_from_angles(np.radians(self.theta), np.radians(self.phi))
 
     @property
     def wavenumber(self) -> float:
@@ -267,24 +254,16 @@ def read_ffe(path: str | os.PathLike[str]) -> tuple[FfeBlock, ...]:
     ('incident_scalar', 30.0, True)
     """
     file = Path(path)
-    try:
-        with TextIOWrapper(opened(file, MOST_BYTES), encoding="utf-8", errors="replace") as stream:
-            found = tuple(_blocks(file, stream))
-    except OSError as error:
-        raise InvalidInputError(f"cannot read {file}: {error.strerror or error}") from error
+    found = tuple(_blocks(file))
     if not found:
         raise InvalidInputError(f"{file} has no far field: no rows below a header of {', '.join(COLUMNS)}")
     return found
 
 
-def _blocks(file: Path, stream: TextIO) -> Iterator[FfeBlock]:
+def _blocks(file: Path) -> Iterator[FfeBlock]:
     block, number, blocks, rows = _Open(), 0, 0, 0
-    # of a line without an end no more is read than is needed to refuse it
-    for number, raw in enumerate(iter(lambda: stream.readline(LONGEST + 2), ""), 1):
-        if len(raw) > LONGEST + 1:
-            raise InvalidInputError(f"{file}, line {number}: more than {LONGEST} characters")
-        line = raw.strip()
-        if not line or line.startswith(("##", "**")):
+    for number, line in lines_of(file, 512_000_000, 4096):
+        if line.startswith(("##", "**")):
             continue
         if line.startswith("#"):
             if block.rows:
@@ -339,7 +318,7 @@ def _closed(file: Path, number: int, block: _Open) -> FfeBlock:
     """The block that ends before a line."""
     sizes = []
     for key in ("No. of Theta Samples", "No. of Phi Samples"):
-        if not _WHOLE.fullmatch(block.keys.get(key, "")):
+        if not re.fullmatch(r"[0-9]{1,9}", block.keys.get(key, "")):
             raise InvalidInputError(f"{file}, block before line {number}: no whole number as {key!r}")
         sizes.append(int(block.keys[key]))
     rows = np.array(block.rows).reshape(-1, len(COLUMNS))

@@ -13,6 +13,7 @@ from creeping._typing import Any, FloatArray
 from creeping._version import __version__
 from creeping.errors import InvalidInputError
 from creeping.field.labelled import power
+from creeping.files.tables import angles_of, joined, number_of
 from creeping.geometry.checks import UNKNOWN, unit_of
 from creeping.geometry.evaluators import speed_of
 from creeping.geometry.incident import PointSource
@@ -25,12 +26,6 @@ if TYPE_CHECKING:
     from creeping.field.cut_result import FieldCut
     from creeping.field.echo import Echo
     from creeping.field.far_result import FarField
-
-ABOUT = "time factor exp(-i w t); far field f exp(i k r)/r; 4 pi |f|^2 is the cross section"
-_FAN = (
-    *("points", "directions", "travel_time", "eikonal", "spreading", "spreading_rate", "curvature", "attenuation"),
-    *("caustic_index", "status", "detachment", "curve_index", "arclength"),
-)
 
 
 Content = tuple[dict[str, Any], dict[str, str]]
@@ -77,11 +72,30 @@ def write_mat(
     """
     from scipy.io import savemat
 
-    content, units = _content(result)
+    # by name: a field's classes need not be imported for a line to be written
+    makers: dict[str, Callable[[Any], Content]] = {
+        "Echo": _echo,
+        "FarField": _far,
+        "FieldCut": _cut,
+        "ShadowLine": _line,
+        "RayFan": _fan,
+    }
+    kinds = [kind.__name__ for kind in type(result).__mro__ if kind.__name__ in makers]
+    if kinds:
+        content, units = makers[kinds[0]](result)
+    elif isinstance(result, Sequence) and all(isinstance(one, IsoPhaseCurve) for one in result):
+        content, units = _curves(result)
+    else:
+        raise InvalidInputError(
+            f"{type(result).__name__} is not written to .mat; give one of {', '.join(makers)}, or a list of "
+            "IsoPhaseCurve"
+        )
+    units = {name: unit for name, unit in units.items() if name in content}
     if observed is not None:
         content |= {"observe": np.array(observed[0], dtype=object), "angle": observed[1]}
         units |= {"angle": "degree"}
-    content |= {"units": units, "about": ABOUT, "creeping_version": __version__}
+    about = "time factor exp(-i w t); far field f exp(i k r)/r; 4 pi |f|^2 is the cross section"
+    content |= {"units": units, "about": about, "creeping_version": __version__}
     # a full disk is an error of Python's own writing
     whole = io.BytesIO()
     savemat(whole, content, do_compression=True, oned_as="column", long_field_names=True)
@@ -89,47 +103,19 @@ def write_mat(
         aside.write_bytes(whole.getvalue())
 
 
-def _content(result: Any) -> Content:
-    from creeping.field.cut_result import FieldCut
-    from creeping.field.echo import Echo
-    from creeping.field.far_result import FarField
-
-    makers: dict[type, Callable[[Any], Content]] = {
-        Echo: _echo,
-        FarField: _far,
-        FieldCut: _cut,
-        ShadowLine: _line,
-        RayFan: _fan,
-    }
-    for kind, make in makers.items():
-        if isinstance(result, kind):
-            return make(result)
-    if isinstance(result, Sequence) and all(isinstance(one, IsoPhaseCurve) for one in result):
-        return _curves(result)
-    names = ", ".join(kind.__name__ for kind in makers)
-    raise InvalidInputError(
-        f"{type(result).__name__} is not written to .mat; give one of {names}, or a list of IsoPhaseCurve"
-    )
-
-
 def _line(line: ShadowLine) -> Content:
     length = unit_of(line.body)
     content = {
         **_wave(line),
-        "curve": np.repeat(np.arange(len(line.curves)), [len(c.points) for c in line.curves]),
-        **{n: _joined([getattr(c, n) for c in line.curves]) for n in ("arclength", "curvature")},
-        **{n: _joined([getattr(c, n) for c in line.curves], 3) for n in ("points", "normals", "tangents")},
+        "curve": number_of(line.curves),
+        **{n: joined([getattr(c, n) for c in line.curves]) for n in ("arclength", "curvature")},
+        **{n: joined([getattr(c, n) for c in line.curves], 3) for n in ("points", "normals", "tangents")},
         "status": np.array([str(s) for c in line.curves for s in c.status], dtype=object),
         "length": line.length,
     }
     units = {"arclength": length, "points": length, "length": length, "curvature": power(length, -1)}
     units |= dict.fromkeys(("direction", "normals", "tangents"), "1")
-    return content, _of(content, units | {"source": length})
-
-
-def _of(content: dict[str, Any], units: dict[str, str]) -> dict[str, str]:
-    """The units of what there is."""
-    return {name: unit for name, unit in units.items() if name in content}
+    return content, units | {"source": length}
 
 
 def _wave(line: ShadowLine) -> dict[str, Any]:
@@ -141,33 +127,30 @@ def _wave(line: ShadowLine) -> dict[str, Any]:
 
 def _fan(fan: RayFan) -> Content:
     length = unit_of(fan.body)
-    content: dict[str, Any] = {name: np.asarray(getattr(fan, name)) for name in _FAN}
-    content |= _wave(fan.line)
-    time = length if speed_of(fan.body) is None else "time"
-    units = dict.fromkeys(("points", "arclength"), length) | dict.fromkeys(
-        ("travel_time", "eikonal", "detachment"), time
+    names = (
+        *("points", "directions", "travel_time", "eikonal", "spreading", "spreading_rate", "curvature", "attenuation"),
+        *("caustic_index", "status", "detachment", "curve_index", "arclength"),
     )
+    content = {name: np.asarray(getattr(fan, name)) for name in names} | _wave(fan.line)
+    time = length if speed_of(fan.body) is None else "time"
+    units = dict.fromkeys(("points", "arclength"), length)
+    units |= dict.fromkeys(("travel_time", "eikonal", "detachment"), time)
     units |= dict.fromkeys(("spreading_rate", "curvature"), power(length, -1)) | {"attenuation": f"{length}^(1/3)"}
     units |= dict.fromkeys(("direction", "directions", "spreading"), "1")
-    return content, _of(content, units | {"source": length})
+    return content, units | {"source": length}
 
 
 def _curves(curves: Sequence[IsoPhaseCurve]) -> Content:
     content = {
-        "curve": np.repeat(np.arange(len(curves)), [len(c.points) for c in curves]),
-        "points": _joined([c.points for c in curves], 3),
-        "rays": _joined([c.rays for c in curves]),
+        "curve": number_of(curves),
+        "points": joined([c.points for c in curves], 3),
+        "rays": joined([c.rays for c in curves]).astype(float),
         "of": np.array([c.of for c in curves], dtype=object),
         "level": np.array([c.level for c in curves]),
         "closed": np.array([c.closed for c in curves], dtype=bool),
     }
     # curves do not know their body
     return content, {"points": UNKNOWN, "level": UNKNOWN}
-
-
-def _joined(arrays: Sequence[Any], width: int | None = None) -> Any:
-    """Rows of all arrays, of ``width`` numbers each if it is given."""
-    return np.concatenate([np.zeros((0, width) if width else 0), *arrays])
 
 
 def _cut(cut: FieldCut) -> Content:
@@ -193,8 +176,6 @@ def _cut(cut: FieldCut) -> Content:
 
 
 def _far(far: FarField) -> Content:
-    from creeping.files.tables import angles_of
-
     angles, length = np.degrees(angles_of(far.directions)), far.unit
     content: dict[str, Any] = {
         "directions": far.directions,
@@ -218,11 +199,9 @@ def _far(far: FarField) -> Content:
 
 
 def _echo(echo: Echo) -> Content:
-    from creeping.field.echo import LEVELS
-
     low, high = echo.bounds()
     content: dict[str, Any] = {
-        "quantity": LEVELS[echo.quantity][0],
+        "quantity": echo.level_name[0],
         "channels": np.array(echo.channels, dtype=object),
         "azimuth": echo.azimuth,
         "elevation": echo.elevation,
@@ -244,5 +223,5 @@ def _echo(echo: Echo) -> Content:
         content["sound_speed"] = echo.sound_speed
     units = {"azimuth": "degree", "elevation": "degree", "incidence": "degree", "frequency": "Hz"}
     units |= {"wavenumber": "1/m", "sound_speed": "m/s"} | dict.fromkeys(("f", *echo.parts, "error"), "m")
-    units |= dict.fromkeys(("level", "level_low", "level_high"), LEVELS[echo.quantity][1])
-    return content, _of(content, units)
+    units |= dict.fromkeys(("level", "level_low", "level_high"), echo.level_name[1])
+    return content, units

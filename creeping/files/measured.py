@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from io import TextIOWrapper
 from pathlib import Path
-from typing import TextIO
 
 import numpy as np
 
@@ -23,19 +22,11 @@ MOST_BYTES = 200_000_000
 """Largest file that is read."""
 MOST_ROWS, MOST_NUMBERS = 1_000_000, 20_000_000
 """Rows of a table, and numbers in all of them."""
-MOST_HEADERS = 10_000
-"""Lines of words and comments above the numbers."""
 LONGEST = 65_536
 """Characters of a line."""
-SHOWN = 12
-"""Names of columns that a message lists."""
-COMMENT = ("#", "%", "!", "//")
 HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "ghz": 1e9}
 _ANGLE = re.compile(r"(angle|azimuth|phi|elev|theta|aspect|incidence|deg|(?<![a-z])(az|el)(?![a-z]))")
-_POLAR = re.compile(r"(elev|theta|(?<![a-z])el(?![a-z]))")
-_AREA = re.compile(r"(m2|m\^2|sqm|sigma|linear)")
 _OTHER = re.compile(r"(phase|error|uncertain|unresolved|method|(?<![a-z])(re|im)(?![a-z]))")
-_RADIANS = re.compile(r"(?<![a-z])rad(ian)?s?(?![a-z])")
 _POLARISATION = re.compile(r"(?<![a-z])(hh|vv|hv|vh)(?![a-z])")
 
 
@@ -86,11 +77,7 @@ def read_cut(path: str | os.PathLike[str]) -> MeasuredCut:
         If it is no such table, with the columns that were found; or if it is too large, with the number of the line.
     """
     file = Path(path)
-    try:
-        with TextIOWrapper(opened(file, MOST_BYTES), encoding="utf-8-sig", errors="replace") as stream:
-            header, numbers = _table(file, stream)
-    except OSError as error:
-        raise InvalidInputError(f"cannot read {file}: {error.strerror or error}") from error
+    header, numbers = _table(file)
     names = header or ["angle", *(f"level {i}" for i in range(1, numbers.shape[1]))]
     at, over, scale = _abscissa(file, names, numbers)
     levels = {}
@@ -99,25 +86,25 @@ def read_cut(path: str | os.PathLike[str]) -> MeasuredCut:
         if column == at or _OTHER.search(lower) or _is_frequency(lower) or (_ANGLE.search(lower) and not _level(lower)):
             continue
         values = numbers[:, column]
-        if _AREA.search(lower) and "db" not in lower:
+        if re.search(r"(m2|m\^2|sqm|sigma|linear)", lower) and "db" not in lower:
             with np.errstate(divide="ignore", invalid="ignore"):
                 values = 10 * np.log10(values)
         levels[name] = values
     if not levels:
         raise InvalidInputError(f"{file} has no column of levels; its columns are {_listed(names)}")
     order = np.argsort(numbers[:, at], kind="stable")
-    polar = over == "angle" and bool(_POLAR.search(names[at].lower()))
+    polar = over == "angle" and bool(re.search(r"(elev|theta|(?<![a-z])el(?![a-z]))", names[at].lower()))
     found = {name: v[order] for name, v in levels.items()}
     return MeasuredCut(file.name, over, scale * numbers[order, at], found, polar)
 
 
-def _table(file: Path, stream: TextIO) -> tuple[list[str], FloatArray]:
+def _table(file: Path) -> tuple[list[str], FloatArray]:
     """Header, empty if there is none, and numbers by row and column, NaN for what is none."""
     headers: list[list[str]] = []
     # a list of lists would take ten times the memory
     numbers, rows, columns, bare = array("d"), 0, 0, False
-    for number, line in _lines(file, stream):
-        comment = line.startswith(COMMENT)
+    for number, line in lines_of(file, MOST_BYTES, LONGEST):
+        comment = line.startswith(("#", "%", "!", "//"))
         cells = _cells(line.lstrip("#%!/ ") if comment else line)
         values = [_number(cell) for cell in cells]
         if comment or not any(value is not None for value in values):
@@ -126,8 +113,8 @@ def _table(file: Path, stream: TextIO) -> tuple[list[str], FloatArray]:
             if not rows:
                 headers.append(cells)
                 bare |= not comment
-                if len(headers) > MOST_HEADERS:
-                    raise InvalidInputError(f"{file}, line {number}: more than {MOST_HEADERS} lines above the numbers")
+                if len(headers) > 10_000:
+                    raise InvalidInputError(f"{file}, line {number}: more than 10000 lines above the numbers")
             continue
         if rows and len(values) != columns:
             raise InvalidInputError(f"{file}, line {number}: {len(values)} columns where {columns} were before")
@@ -147,19 +134,31 @@ def _table(file: Path, stream: TextIO) -> tuple[list[str], FloatArray]:
     return header, np.array(numbers).reshape(rows, columns)
 
 
-def _lines(file: Path, stream: TextIO) -> Iterator[tuple[int, str]]:
-    """Lines that are not empty, with their numbers; of one without an end no more is read than is needed to refuse."""
-    for number, raw in enumerate(iter(lambda: stream.readline(LONGEST + 2), ""), 1):
-        if len(raw) > LONGEST + 1:
-            raise InvalidInputError(f"{file}, line {number}: more than {LONGEST} characters")
-        if line := raw.strip():
-            yield number, line
+def lines_of(file: Path, most_bytes: int, longest: int) -> Iterator[tuple[int, str]]:
+    """Lines of a text file that are not empty, with their numbers.
+
+    Of a line without an end no more is read than is needed to refuse it.
+
+    Raises
+    ------
+    InvalidInputError
+        If it cannot be read, or a line is too long.
+    """
+    try:
+        with TextIOWrapper(opened(file, most_bytes), encoding="utf-8-sig", errors="replace") as stream:
+            for number, raw in enumerate(iter(lambda: stream.readline(longest + 2), ""), 1):
+                if len(raw) > longest + 1:
+                    raise InvalidInputError(f"{file}, line {number}: more than {longest} characters")
+                if line := raw.strip():
+                    yield number, line
+    except OSError as error:
+        raise InvalidInputError(f"cannot read {file}: {error.strerror or error}") from error
 
 
 def _listed(names: list[str]) -> str:
-    """Names as a message has them: the first ones, each cut if long."""
-    more = f", and {len(names) - SHOWN} more" * (len(names) > SHOWN)
-    return ", ".join(name[:40] for name in names[:SHOWN]) + more
+    """Names as a message has them: the first twelve, each cut if long."""
+    more = f", and {len(names) - 12} more" * (len(names) > 12)
+    return ", ".join(name[:40] for name in names[:12]) + more
 
 
 def _cells(line: str) -> list[str]:
@@ -188,7 +187,9 @@ def _abscissa(file: Path, names: list[str], numbers: FloatArray) -> tuple[int, s
             unit = next((unit for unit in ("ghz", "mhz", "khz") if unit in name), "hz")
             found.append((column, "frequency", HERTZ[unit]))
         elif _ANGLE.search(name) and not _level(name):
-            found.append((column, "angle", float(np.degrees(1.0)) if _RADIANS.search(name) else 1.0))
+            found.append(
+                (column, "angle", float(np.degrees(1.0)) if re.search(r"(?<![a-z])rad(ian)?s?(?![a-z])", name) else 1.0)
+            )
     varied = [one for one in found if len(np.unique(numbers[:, one[0]])) > 1]
     if len(varied) > 1:
         raise InvalidInputError(f"{file} varies {' and '.join(names[one[0]] for one in varied)}; give a cut of one")

@@ -1,26 +1,18 @@
-"""Files of lines, fans, iso-phase curves, far fields and fields on planes for other programs: VTK (.vtp) and CSV.
+"""Files of lines, fans, iso-phase curves, far fields, fields on planes and echoes: VTK (.vtp) and CSV.
 
-Numbers keep all 17 digits, so that what is read back is what was written.
-
-Also here: a field on a plane as a table: one row for each point outside the body.
-
-Also here: a far field as a table: one row per direction, the total and its parts, for a vector field each component.
-
-Also here: an echo as a table: a row for each channel, angle and frequency, columns explained in lines that begin with
-#.
+Numbers keep all 17 digits, so that what is read back is what was written. A table has one row for each point, direction
+or value; its columns are explained in lines that begin with ``#``.
 """
 
 import os
-import re
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.files import tables as _cut_table
-from creeping.files import tables as _far_table
+from creeping.field.comparison import cross_section_decibels, decibels
 from creeping.files.polylines import polydata
 from creeping.geometry.checks import UNKNOWN, unit_of
 from creeping.rays.fan import RayFan
@@ -33,58 +25,9 @@ if TYPE_CHECKING:
     from creeping.field.echo import Echo
     from creeping.field.far_result import FarField
     from creeping.field.impulse import RangeProfile
-from itertools import repeat
-from typing import TYPE_CHECKING
 
-from creeping.field.comparison import cross_section_decibels, decibels
-
-_RAY_COLUMNS = ("eikonal", "spreading", "spreading_rate", "curvature", "caustic_index")
-
-_COMPONENTS = ("_tt", "_tp", "_pt", "_pp")
-
-COLUMNS = {
-    "channel": "polarisation received and transmitted (V along theta, H along phi), or the boundary",
-    "azimuth_deg": "as seen from the body",
-    "elevation_deg": "as seen from the body",
-    "frequency_hz": "",
-    "wavenumber_1_m": "k",
-    "level_db": "",
-    "low_db": "level of |f| less its error",
-    "high_db": "level of |f| and its error",
-    "phase_deg": "of f, relative to the origin of the body's coordinates; time factor exp(-i w t)",
-    "re_m": "real part of f",
-    "im_m": "imaginary part of f",
-    "error_m": "of |f|",
-}
-_POSITION = {"x": "position, L", "y": "position, L", "z": "position, L"}
-_LINE_NOTES = {
-    "curve": "number of the closed curve",
-    "s": "arclength along it, L",
-    **_POSITION,
-    "status": "attached, occluded or concave",
-}
-_FAN_NOTES = {
-    "ray": "number of the ray",
-    "step": "number of the point on it",
-    "t": "travel time; L where the speed is 1",
-    **_POSITION,
-    "px": "unit tangent",
-    "py": "unit tangent",
-    "pz": "unit tangent",
-    "eikonal": "as t",
-    "J": "spreading, 1 on the shadow line",
-    "dJ": "its rate along the ray",
-    "kappa_n": "normal curvature along the ray, 1/L, positive where convex",
-    "caustic_index": "zeros of J passed",
-    "status": "status code of the ray",
-}
-_CURVE_NOTES = {
-    "curve": "number of the curve",
-    "of": "travel_time or eikonal",
-    "level": "its constant value; L where the speed is 1",
-    "closed": "1 if the last point joins the first",
-    **_POSITION,
-}
+Column = tuple[str, str, Any]
+"""Name, what it holds (nothing if the name says it), and values (rows,)."""
 
 
 def write_vtp(
@@ -175,98 +118,116 @@ def write_csv(
         raise InvalidInputError(
             f"write_csv got {' and '.join(given) or 'nothing'}; give exactly one of {', '.join(parts)}, a file for each"
         )
-    with written_aside(path) as aside, aside.open("w", encoding="ascii", newline="\n") as stream:
+    if line is not None:
+        columns = _line_columns(line)
+    elif fan is not None:
+        columns = _fan_columns(fan)
+    elif curves is not None:
+        columns = _curve_columns(curves)
+    elif far is not None:
+        columns = _far_columns(far, observed)
+    else:
+        columns = _cut_columns(cut)
+    _write_table(path, columns, mark)
+
+
+def _write_table(path: str | os.PathLike[str], columns: Sequence[Column], mark: str = "") -> None:
+    names, notes, values = zip(*columns, strict=True)
+    with written_aside(path) as aside, aside.open("w", encoding="utf-8", newline="\n") as stream:
         stream.writelines([f"# {mark}\n"] if mark else [])
-        if line is not None:
-            _write_table(stream, _in_unit(_LINE_NOTES, unit_of(line.body)), _line_rows(line))
-        elif fan is not None:
-            _write_table(stream, _in_unit(_FAN_NOTES, unit_of(fan.body)), _fan_rows(fan))
-        elif curves is not None:
-            unit = curves[0].unit if curves else UNKNOWN
-            _write_table(stream, _in_unit(_CURVE_NOTES, unit), _curve_rows(curves))
-        elif far is not None:
-            _write_table(
-                stream,
-                _far_table.far_field_notes(far, observed=observed is not None),
-                _far_table.far_field_rows(far, observed),
-            )
-        elif cut is not None:
-            _write_table(stream, _cut_table.notes(cut), _cut_table.rows(cut))
+        stream.writelines(f"# {name}: {note}\n" for name, note in zip(names, notes, strict=True) if note)
+        stream.write(",".join(names) + "\n")
+        # not all rows at once: as Python's numbers they take several times the memory
+        for first in range(0, len(values[0]), 4096):
+            block = (np.asarray(column[first : first + 4096]).tolist() for column in values)
+            # str of a Python float is its repr: the shortest text that reads back to the same number
+            stream.writelines(",".join(map(str, row)) + "\n" for row in zip(*block, strict=True))
 
 
-def _in_unit(notes: dict[str, str], unit: str) -> dict[str, str]:
-    """Notes with the unit of the body's lengths in place of L."""
-    return {name: re.sub(r"\bL\b", unit, note) for name, note in notes.items()}
+def joined(arrays: Iterable[Any], width: int | None = None) -> Any:
+    """Rows of all arrays, of ``width`` numbers each if it is given."""
+    parts = [np.asarray(one) for one in arrays]
+    return np.concatenate(parts) if parts else np.zeros((0, width) if width else 0)
 
 
-def _write_table(stream: TextIO, notes: dict[str, str], rows: Iterable[tuple[Any, ...]]) -> None:
-    stream.writelines(f"# {name}: {note}\n" for name, note in notes.items())
-    stream.write(",".join(notes) + "\n")
-    # str of a Python float is its repr: the shortest text that reads back to the same number
-    stream.writelines(",".join(map(str, row)) + "\n" for row in rows)
+def number_of(parts: Sequence[Any]) -> Any:
+    """For each of the points of curves the number of its curve."""
+    return np.repeat(np.arange(len(parts)), [len(one.points) for one in parts])
 
 
-def _line_rows(line: ShadowLine) -> Iterable[tuple[Any, ...]]:
-    for number, curve in enumerate(line.curves):
-        arclength, points = np.asarray(curve.arclength).tolist(), np.asarray(curve.points).tolist()
-        for s, point, status in zip(arclength, points, curve.status, strict=True):
-            yield (number, s, *point, status)
+def _position(points: FloatArray, unit: str) -> list[Column]:
+    """Columns of points (rows, 3)."""
+    return [(name, f"position, {unit}", values) for name, values in zip("xyz", points.T, strict=True)]
 
 
-def _fan_rows(fan: RayFan) -> Iterable[tuple[Any, ...]]:
-    times = np.asarray(fan.travel_time).tolist()
-    for ray in range(len(fan.points)):
-        status = int(fan.status[ray])
-        columns = (fan.points, fan.directions, *(getattr(fan, name) for name in _RAY_COLUMNS))
-        values = zip(times, *(np.asarray(column[ray]).tolist() for column in columns), strict=True)
-        for step, (t, point, direction, *carried) in enumerate(values):
-            yield (ray, step, t, *point, *direction, *carried, status)
+def _line_columns(line: ShadowLine) -> list[Column]:
+    unit, curves = unit_of(line.body), line.curves
+    return [
+        ("curve", "number of the closed curve", number_of(curves)),
+        ("s", f"arclength along it, {unit}", joined(one.arclength for one in curves)),
+        *_position(joined((one.points for one in curves), 3), unit),
+        ("status", "attached, occluded or concave", joined(one.status for one in curves)),
+    ]
 
 
-def _curve_rows(curves: Sequence[IsoPhaseCurve]) -> Iterable[tuple[Any, ...]]:
-    for number, curve in enumerate(curves):
-        for point in np.asarray(curve.points).tolist():
-            yield (number, curve.of, float(curve.level), int(curve.closed), *point)
+def _fan_columns(fan: RayFan) -> list[Column]:
+    unit, (rays, steps) = unit_of(fan.body), np.shape(fan.eikonal)
+    tangents = np.asarray(fan.directions).reshape(-1, 3).T
+    return [
+        ("ray", "number of the ray", np.repeat(np.arange(rays), steps)),
+        ("step", "number of the point on it", np.tile(np.arange(steps), rays)),
+        ("t", f"travel time; {unit} where the speed is 1", np.tile(fan.travel_time, rays)),
+        *_position(np.asarray(fan.points).reshape(-1, 3), unit),
+        *((name, "unit tangent", values) for name, values in zip(("px", "py", "pz"), tangents, strict=True)),
+        ("eikonal", "as t", np.ravel(fan.eikonal)),
+        ("J", "spreading, 1 on the shadow line", np.ravel(fan.spreading)),
+        ("dJ", "its rate along the ray", np.ravel(fan.spreading_rate)),
+        ("kappa_n", f"normal curvature along the ray, 1/{unit}, positive where convex", np.ravel(fan.curvature)),
+        ("caustic_index", "zeros of J passed", np.ravel(fan.caustic_index)),
+        ("status", "status code of the ray", np.repeat(fan.status, steps)),
+    ]
 
 
-def notes(cut: "FieldCut") -> dict[str, str]:
-    """Columns and what they hold."""
-    field = cut.field
-    unit = field.length_unit
-    of = f"k = {field.wavenumber!r} 1/{unit}, {field.boundary} boundary, order {field.order}, time factor exp(-i w t)"
-    place = f"from ({', '.join(f'{v!r}' for v in cut.point.tolist())})"
-    columns = {
-        name: f"along ({', '.join(f'{v!r}' for v in axis)}) {place}, {unit}"
-        for name, axis in zip(("across", "up"), cut.axes.tolist(), strict=True)
-    }
-    columns |= {name: f"position, {unit}" for name in "xyz"}
-    for name in _names(cut):
-        columns[f"re_{name}"] = f"real part of {name}, {field.unit}; {of}"
-        columns[f"im_{name}"] = "imaginary part"
-    columns["error"] = f"of the field, {field.unit}"
-    columns["status"] = "0 OK, 1 LIT, 2 CAUSTIC, 3 NO_RAY, 4 DETACHED, 5 TRUNCATED, 6 UNRESOLVED"
-    columns["method"] = "the method used"
-    return columns
+def _curve_columns(curves: Sequence[IsoPhaseCurve]) -> list[Column]:
+    unit, number = curves[0].unit if curves else UNKNOWN, number_of(curves)
+    of, level = np.array([one.of for one in curves]), np.array([float(one.level) for one in curves])
+    return [
+        ("curve", "number of the curve", number),
+        ("of", "travel_time or eikonal", of[number]),
+        ("level", f"its constant value; {unit} where the speed is 1", level[number]),
+        ("closed", "1 if the last point joins the first", np.array([int(one.closed) for one in curves])[number]),
+        *_position(joined((one.points for one in curves), 3), unit),
+    ]
 
 
-def rows(cut: "FieldCut") -> Iterable[tuple[Any, ...]]:
-    """One tuple for each point outside, in the order of `notes`."""
-    across, up = np.meshgrid(cut.across, cut.up)
-    columns: list[Any] = [across[cut.outside], up[cut.outside], *cut.field.points.T]
-    for name in _names(cut):
-        values = _values(cut, name)
-        columns += [values.real, values.imag]
-    columns += [cut.field.error, cut.field.status, cut.field.method]
-    yield from zip(*(np.asarray(column).tolist() for column in columns), strict=True)
+def _wave_words(field: Any, unit: str) -> str:
+    return f"k = {field.wavenumber!r} 1/{unit}, {field.boundary} boundary, order {field.order}, time factor exp(-i w t)"
 
 
-def _names(cut: "FieldCut") -> list[str]:
-    return ["u"] if cut.quantities == ("u",) else [f"{letter}{axis}" for letter in cut.quantities for axis in "xyz"]
-
-
-def _values(cut: "FieldCut", name: str) -> Any:
+def _cut_columns(cut: Any) -> list[Column]:
+    """Of a `FieldCut`: a row for each point outside the body."""
     field: Any = cut.field
-    return field.values if name == "u" else getattr(field, name[0])[:, "xyz".index(name[1])]
+    unit, outside = field.length_unit, cut.outside
+    place = f"from ({', '.join(f'{v!r}' for v in cut.point.tolist())})"
+    columns: list[Column] = [
+        (name, f"along ({', '.join(f'{v!r}' for v in axis)}) {place}, {unit}", grid[outside])
+        for name, axis, grid in zip(("across", "up"), cut.axes.tolist(), np.meshgrid(cut.across, cut.up), strict=True)
+    ]
+    columns += _position(field.points, unit)
+    if cut.quantities == ("u",):
+        fields = {"u": field.values}
+    else:
+        fields = {f"{one}{axis}": getattr(field, one)[:, i] for one in cut.quantities for i, axis in enumerate("xyz")}
+    for name, values in fields.items():
+        columns.append((f"re_{name}", f"real part of {name}, {field.unit}; {_wave_words(field, unit)}", values.real))
+        columns.append((f"im_{name}", "imaginary part", values.imag))
+    states = "0 OK, 1 LIT, 2 CAUSTIC, 3 NO_RAY, 4 DETACHED, 5 TRUNCATED, 6 UNRESOLVED"
+    return [
+        *columns,
+        ("error", f"of the field, {field.unit}", field.error),
+        ("status", states, field.status),
+        ("method", "the method used", field.method),
+    ]
 
 
 def angles_of(directions: FloatArray) -> FloatArray:
@@ -278,76 +239,52 @@ def angles_of(directions: FloatArray) -> FloatArray:
     return np.stack([np.arctan2(across, z), np.where(phi >= 2 * np.pi, 0.0, phi)], axis=-1)
 
 
-def far_field_notes(far: "FarField", *, observed: bool = False) -> dict[str, str]:
-    """Columns and what they hold."""
-    unit = far.unit
-    of = f"k = {far.wavenumber!r} 1/{unit}, {far.boundary} boundary, order {far.order}, time factor exp(-i w t)"
-    columns = {
-        "x": "direction from the body to the observer",
-        "y": "direction",
-        "z": "direction",
-        "theta": "degrees from z",
-        "phi": "degrees from x, 0 at the poles",
+def _far_columns(far: "FarField", observed: tuple[Sequence[str], FloatArray] | None) -> list[Column]:
+    """A row for each direction; of a vector field columns for each component."""
+    unit, count, x = far.unit, len(far.directions), np.asarray(far.directions).T
+    theta, phi = np.degrees(angles_of(far.directions)).T
+    columns: list[Column] = [
+        ("x", "direction from the body to the observer", x[0]),
+        ("y", "direction", x[1]),
+        ("z", "direction", x[2]),
+        ("theta", "degrees from z", theta),
+        ("phi", "degrees from x, 0 at the poles", phi),
+    ]
+    known = {
+        "extinction": "measured inside the body, for 95 of 100 directions",
+        "extrapolated": f"of rays, its level measured against currents at k = {far.measured_at or 0:.4g}",
+        "": "not known",
     }
-    for suffix in _suffixes(far):
-        name = f", {_spelled(suffix)} by {_spelled(suffix[0] + suffix[2:])} incident" if suffix else ""
-        columns[f"re{suffix}"] = f"real part of the far field f, {unit}{name}; {of}"
-        columns[f"im{suffix}"] = "imaginary part"
-        columns[f"dB{suffix}"] = "20 log10 |f|, -inf where f is 0"
+    error_of = known.get(far.error_by or "", "of rays, by the size of their second order")
+    spelled = {"t": "theta", "p": "phi"}
+    for number, suffix in enumerate(("",) if np.ndim(far.total) == 1 else ("_tt", "_tp", "_pt", "_pp")):
+        name = f", {spelled[suffix[1]]} by {spelled[suffix[2]]} incident" if suffix else ""
+        total, error, *parts = (
+            np.asarray(values).reshape(count, -1)[:, number] for values in (far.total, far.error, *far.parts.values())
+        )
         area = "dBsm" if unit == "m" else f"dB re 1 {unit}^2"
-        columns[f"rcs_dB{suffix}"] = f"10 log10(4 pi |f|^2), {area}"
-        columns[f"error{suffix}"] = f"error of f, {unit}, {_error_of(far)}"
-        for part in far.parts:
-            columns[f"{part}_re{suffix}"] = f"part of f, {unit}{name}"
-            columns[f"{part}_im{suffix}"] = "imaginary part"
-    columns["method"] = "what gave the field, or its part of creeping rays"
-    columns["unresolved"] = "1 where a part was not found, its expansion fails or the error is large"
-    if observed:
-        columns["observe"] = "what was asked for, its commas blanks"
-        columns["angle"] = "degrees along a cut, theta with the sign of its side; nan of what is no cut"
+        columns += [
+            (f"re{suffix}", f"real part of the far field f, {unit}{name}; {_wave_words(far, unit)}", total.real),
+            (f"im{suffix}", "imaginary part", total.imag),
+            (f"dB{suffix}", "20 log10 |f|, -inf where f is 0", decibels(total)),
+            (f"rcs_dB{suffix}", f"10 log10(4 pi |f|^2), {area}", cross_section_decibels(total)),
+            (f"error{suffix}", f"error of f, {unit}, {error_of}", error),
+        ]
+        for part, values in zip(far.parts, parts, strict=True):
+            columns.append((f"{part}_re{suffix}", f"part of f, {unit}{name}", values.real))
+            columns.append((f"{part}_im{suffix}", "imaginary part", values.imag))
+    doubt = "1 where a part was not found, its expansion fails or the error is large"
+    columns.append(("method", "what gave the field, or its part of creeping rays", far.method))
+    columns.append(("unresolved", doubt, np.asarray(far.unresolved).astype(int)))
+    if observed is not None:
+        texts, angles = [text.replace(",", " ") for text in observed[0]], observed[1]
+        columns.append(("observe", "what was asked for, its commas blanks", texts))
+        columns.append(("angle", "degrees along a cut, theta with the sign of its side; nan of what is no cut", angles))
     return columns
 
 
-def far_field_rows(
-    far: "FarField", observed: "tuple[Sequence[str], FloatArray] | None" = None
-) -> Iterable[tuple[Any, ...]]:
-    """One tuple for each direction, in the order of `far_field_notes`."""
-    columns: list[Any] = [*np.asarray(far.directions).T, *np.degrees(angles_of(far.directions)).T]
-    for k in range(len(_suffixes(far))):
-        total = _component(far.total, k)
-        columns += [total.real, total.imag, decibels(total), cross_section_decibels(total), _component(far.error, k)]
-        for values in (_component(part, k) for part in far.parts.values()):
-            columns += [values.real, values.imag]
-    numbers = zip(*(np.asarray(column).tolist() for column in columns), strict=True)
-    texts, angles = observed or ((), np.zeros(0))
-    ends = zip((text.replace(",", " ") for text in texts), angles.tolist(), strict=True) if observed else repeat(())
-    for row, method, lost, end in zip(numbers, far.method, far.unresolved, ends, strict=False):
-        yield (*row, method, int(lost), *end)
-
-
-def _error_of(far: "FarField") -> str:
-    if far.error_by == "extinction":
-        return "measured inside the body, for 95 of 100 directions"
-    if far.error_by == "extrapolated":
-        return f"of rays, its level measured against currents at k = {far.measured_at:.4g}"
-    return "of rays, by the size of their second order" if far.error_by else "not known"
-
-
-def _suffixes(far: "FarField") -> tuple[str, ...]:
-    return ("",) if np.ndim(far.total) == 1 else _COMPONENTS
-
-
-def _component(values: Any, number: int) -> Any:
-    """One component (m,) of a field (m,) or (m, 2, 2)."""
-    return np.asarray(values).reshape(len(values), -1)[:, number]
-
-
-def _spelled(suffix: str) -> str:
-    return {"t": "theta", "p": "phi"}[suffix[1]]
-
-
 def write_echo(path: str | os.PathLike[str], echo: "Echo", *, known: BoolArray | None = None, mark: str = "") -> None:
-    """Write an echo as CSV.
+    """Write an echo as CSV, a row for each channel, angle and frequency.
 
     Parameters
     ----------
@@ -363,47 +300,34 @@ def write_echo(path: str | os.PathLike[str], echo: "Echo", *, known: BoolArray |
     CreepingError
         If the file cannot be written.
     """
-    from creeping.field.echo import LEVELS
-
-    total, levels, (low, high) = echo.total, echo.levels(), echo.bounds()
-    phase = np.degrees(np.angle(total))
-    name, unit = LEVELS[echo.quantity]
-    words = COLUMNS | {"level_db": f"{name}, {unit}"}
-    words |= {f"{part}_{axis}_m": f"{part} part of f" for part in echo.parts for axis in ("re", "im")}
-    words |= {
-        "unresolved": "1 where an expansion fails or the error is large",
-        "method": "rays, currents, or rays+optics of a body with edges, joints or tips",
-    }
-    hertz = echo.hertz
-    with written_aside(path) as aside, open(aside, "w", encoding="utf-8", newline="\n") as stream:
-        stream.writelines([f"# {mark}\n"] if mark else [])
-        stream.writelines(f"# {key}: {text}\n" for key, text in words.items() if text)
-        stream.write(",".join(words) + "\n")
-        for at in np.ndindex(total.shape):
-            c, n, k = at
-            if known is not None and not known[n, k]:
-                continue
-            row: list[Any] = [
-                echo.channels[c],
-                echo.azimuth[n],
-                echo.elevation[n],
-                hertz[k],
-                echo.wavenumbers[k],
-                levels[at],
-            ]
-            row += [low[at], high[at], phase[at], total[at].real, total[at].imag, echo.error[at]]
-            for part in echo.parts.values():
-                row += [part[at].real, part[at].imag]
-            row += [
-                echo.unresolved[at].astype(int),
-                "currents" if echo.by_currents[at] and echo.otherwise != "t-matrix" else echo.otherwise,
-            ]
-            stream.write(",".join(map(_text, row)) + "\n")
-
-
-def _text(value: object) -> str:
-    """Shortest text that reads back to the same number."""
-    return value if isinstance(value, str) else repr(getattr(value, "item", lambda: value)())
+    shape = echo.total.shape
+    at = c, n, k = np.nonzero(np.broadcast_to(True if known is None else known, shape))
+    total, (low, high) = echo.total[at], echo.bounds()
+    by_currents = echo.by_currents[at] & (echo.otherwise != "t-matrix")
+    kind = "polarisation received and transmitted (V along theta, H along phi), or the boundary"
+    phase = "of f, relative to the origin of the body's coordinates; time factor exp(-i w t)"
+    columns: list[Column] = [
+        ("channel", kind, np.array(echo.channels)[c]),
+        ("azimuth_deg", "as seen from the body", echo.azimuth[n]),
+        ("elevation_deg", "as seen from the body", echo.elevation[n]),
+        ("frequency_hz", "", echo.hertz[k]),
+        ("wavenumber_1_m", "k", echo.wavenumbers[k]),
+        ("level_db", ", ".join(echo.level_name), echo.levels()[at]),
+        ("low_db", "level of |f| less its error", low[at]),
+        ("high_db", "level of |f| and its error", high[at]),
+        ("phase_deg", phase, np.degrees(np.angle(total))),
+        ("re_m", "real part of f", total.real),
+        ("im_m", "imaginary part of f", total.imag),
+        ("error_m", "of |f|", echo.error[at]),
+    ]
+    for part, values in echo.parts.items():
+        columns.append((f"{part}_re_m", f"{part} part of f", values[at].real))
+        columns.append((f"{part}_im_m", f"{part} part of f", values[at].imag))
+    doubt = "1 where an expansion fails or the error is large"
+    method = "rays, currents, or rays+optics of a body with edges, joints or tips"
+    columns.append(("unresolved", doubt, echo.unresolved[at].astype(int)))
+    columns.append(("method", method, np.where(by_currents, "currents", echo.otherwise)))
+    _write_table(path, columns, mark)
 
 
 def write_profile(path: str | os.PathLike[str], profiles: "dict[str, RangeProfile]", echo: "Echo") -> None:
@@ -414,11 +338,13 @@ def write_profile(path: str | os.PathLike[str], profiles: "dict[str, RangeProfil
     CreepingError
         If the file cannot be written.
     """
-    with written_aside(path) as aside, open(aside, "w", encoding="utf-8", newline="\n") as stream:
-        stream.write("# range_m: along the line of sight, 0 at the origin, negative towards the radar\n")
-        stream.write("# level_db: of the echo from there\n")
-        stream.write("channel,range_m,level_db,phase_deg\n")
-        for channel, found in profiles.items():
-            levels, phase = echo.levels(found.values), np.degrees(np.angle(found.values))
-            for values in zip(found.range.tolist(), levels.tolist(), phase.tolist(), strict=True):
-                stream.write(f"{channel},{','.join(map(repr, values))}\n")
+    found = profiles.values()
+    values = joined(one.values for one in found)
+    place = "along the line of sight, 0 at the origin, negative towards the radar"
+    columns: list[Column] = [
+        ("channel", "", np.repeat(list(profiles), [len(one.range) for one in found])),
+        ("range_m", place, joined(one.range for one in found)),
+        ("level_db", "of the echo from there", echo.levels(values)),
+        ("phase_deg", "", np.degrees(np.angle(values))),
+    ]
+    _write_table(path, columns)

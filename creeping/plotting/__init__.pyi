@@ -9,8 +9,8 @@ from .echo_pictures import range_picture as range_picture
 from .far_cuts import far_cut_picture as far_cut_picture
 from .field_pictures import decay_picture as decay_picture
 from .field_pictures import surface_field_picture as surface_field_picture
-from .parameter_plane import plot_parameters as plot_parameters
-from .pictures import parameter_picture as parameter_picture
+from .line_plots import parameter_picture as parameter_picture
+from .line_plots import plot_parameters as plot_parameters
 from .pictures import picture as picture
 from .plane_pictures import field_cut_picture as field_cut_picture
 from .scene import GLProbe as GLProbe

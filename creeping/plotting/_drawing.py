@@ -12,13 +12,14 @@ toward = (cos e cos a, cos e sin a, sin e) points from the body to the camera (a
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Unpack
 
 import numpy as np
 
 from creeping._presenting import brief
 from creeping._typing import Any, ArrayLike, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.boundary import BoundaryLike, boundary_name
+from creeping.field.boundary import boundary_name
 from creeping.geometry.checks import unit_of
 from creeping.geometry.directions import unit_direction
 from creeping.geometry.evaluators import speed_of
@@ -26,18 +27,13 @@ from creeping.geometry.incident import Incident, PointSource, incident_words
 from creeping.geometry.piecewise import drawn_mesh
 from creeping.geometry.surface import Surface, normal, size
 from creeping.geometry.triangulation import Triangulation
-from creeping.plotting._strokes import LevelColours, Stroke, drawn_curves, drawn_ends, strokes
+from creeping.plotting._strokes import LevelColours, RayLook, RayOptions, Stroke, drawn_curves, drawn_ends, strokes
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowLine
 
 INCIDENT = ("d", "S")
 """Names of the arrow of the wave."""
-NAMES_APART = 0.5
-"""Least distance of the names of two axes, in lengths of an axis."""
-NEAR_SOURCE, SIDEWAYS, STEEP = 2.5, 75.0, 55.0
-"""Distance from all of the body, in body sizes, within which a source is in the picture; degrees by which the camera
-stands aside of its wave, so that the source and its shadow both show, and above or below a body that hides it."""
 
 
 @dataclass(frozen=True)
@@ -215,7 +211,8 @@ class Drawing:
         extent = float(np.max(high - low))
         if self.source is not None:
             away = np.linalg.norm(self.mesh.vertices - self.source, axis=1)
-            if np.max(away) < NEAR_SOURCE * size(self.body):
+            # farther away it is not in the picture
+            if np.max(away) < 2.5 * size(self.body):
                 long = min(0.38 * extent, 0.8 * float(np.min(away)))
                 return Mark("S", self.source, self.source + long * self.direction)
         along = 0.38 * extent * self.direction
@@ -236,7 +233,8 @@ class Drawing:
             low[1] + 0.03 * extent - min(0.0, float(flat[:, 1].min())),
         )
         marks = [Mark(name, foot, foot + length * unit) for name, unit in zip("xyz", np.eye(3), strict=True)]
-        return _apart(marks, self.view, NAMES_APART * length)
+        # names of two axes stand half an axis apart at least
+        return _apart(marks, self.view, 0.5 * length)
 
     @property
     def marks(self) -> list[Mark]:
@@ -275,8 +273,9 @@ class Drawing:
 
 def _source_view(body: Surface, source: FloatArray, towards: FloatArray) -> View:
     """Camera aside of the wave of a point source, raised or lowered where the body would hide the source."""
-    first = shadow_view(towards, turned=np.radians(SIDEWAYS))
-    tried = [first, *(View(first.azimuth, np.radians(e)) for e in (STEEP, -STEEP))]
+    # so far aside that the source and its shadow both show
+    first = shadow_view(towards, turned=np.radians(75.0))
+    tried = [first, *(View(first.azimuth, np.radians(e)) for e in (55.0, -55.0))]
     return next((view for view in tried if view.visible(body, source[None])[0]), first)
 
 
@@ -289,17 +288,15 @@ def caption(body: Any, source: Incident, error: str = "", more: str = "", *, nam
 def rays_caption(
     line: ShadowLine,
     fan: RayFan | None,
-    until: float | None = None,
-    wavenumber: float | None = None,
-    boundary: BoundaryLike = "hard",
+    look: RayLook,
     name: str = "",
 ) -> str:
     """Body, wave and error of rays, and up to where they are drawn; for the arguments see `picture`."""
     if fan is None:
         return caption(line.body, line.source, name=name)
-    wave = "k ρ = 10" if wavenumber is None else f"k = {wavenumber:g}/{unit_of(line.body)}"
-    faded = f"rays: paler every 10 dB ({boundary_name(boundary)}, {wave}), to 30 dB or their second caustic"
-    if until is not None or speed_of(line.body) is not None:
+    wave = "k ρ = 10" if look.wavenumber is None else f"k = {look.wavenumber:g}/{unit_of(line.body)}"
+    faded = f"rays: paler every 10 dB ({boundary_name(look.boundary)}, {wave}), to 30 dB or their second caustic"
+    if look.until is not None or speed_of(line.body) is not None:
         faded = ""
     error = f"error of the rays' ends {fan.error.rms:.1e} rms" if fan.error.samples else ""
     return caption(line.body, line.source, error, faded, name=name)
@@ -317,12 +314,9 @@ def compose(
     curves: Sequence[IsoPhaseCurve] = (),
     *,
     view: View | None = None,
-    rays: int = 48,
-    until: float | None = None,
-    wavenumber: float | None = None,
-    boundary: BoundaryLike = "hard",
     name: str = "",
     cells: int = 80,
+    **shown: Unpack[RayOptions],
 ) -> Drawing:
     """Compose the picture of a shadow line, its rays and iso-phase curves; for the arguments see `picture`.
 
@@ -331,8 +325,8 @@ def compose(
     cells : int
         Fineness of the body, cells along each side of its box.
     """
-    body, source = line.body, None
-    ends = drawn_ends(fan, until, wavenumber, boundary)
+    body, source, look = line.body, None, RayLook(**shown)
+    ends = drawn_ends(fan, look.until, look.wavenumber, look.boundary)
     curves = drawn_curves(curves, fan, ends)
     mesh, normals = drawn_mesh(body, cells)
     if isinstance(line.source, PointSource):
@@ -349,8 +343,8 @@ def compose(
         camera if view is None else view,
         mesh,
         normals,
-        strokes(line, fan, curves, rays=rays, ends=ends),
+        strokes(line, fan, curves, rays=look.rays, ends=ends),
         LevelColours.of(curves),
         source=source,
-        title=rays_caption(line, fan, until, wavenumber, boundary, name),
+        title=rays_caption(line, fan, look, name),
     )

@@ -7,6 +7,7 @@ weak, and covers the picture.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import TypedDict
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from creeping.field.creeping_modes import fock_scale, slowest_decay
 from creeping.geometry.checks import UNKNOWN
 from creeping.geometry.evaluators import speed_of
 from creeping.geometry.surface import size
+from creeping.plotting.pages import add_bar
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.rays.reach import IN_RANGE
@@ -31,12 +33,28 @@ FADED, FADED_WIDTH = 0.4, 0.5
 HIDDEN = 0.22  # share of its ink that a line behind the body keeps
 # apart in lightness as well as in hue, and apart from the map of the iso-phase levels
 STATUS_COLOURS = {"attached": "#111111", "occluded": "#e8890c", "concave": "#d6409f"}
-FADES, CROSSED = (10.0, 20.0, 30.0), 2
-"""Decibels by which the wave of a ray has fallen where it is drawn paler and at last no more, and zeros of J that it
-passes at most."""
-PALER = (1.0, 0.6, 0.35)
-"""Opacity of rays between these."""
+FADES = (10.0, 20.0, 30.0)
+"""Decibels by which the wave of a ray has fallen where it is drawn paler and at last no more."""
 LEVEL_NAMES = {"travel_time": "travel time", "eikonal": "eikonal"}
+
+
+class RayOptions(TypedDict, total=False):
+    """Options of all pictures of rays; see `picture`."""
+
+    rays: int
+    until: float | None
+    wavenumber: float | None
+    boundary: BoundaryLike
+
+
+@dataclass(frozen=True)
+class RayLook:
+    """What `RayOptions` are by default."""
+
+    rays: int = 48
+    until: float | None = None
+    wavenumber: float | None = None
+    boundary: BoundaryLike = "hard"
 
 
 @dataclass(frozen=True)
@@ -114,7 +132,8 @@ def drawn_ends(
         return np.zeros((len(FADES), 0))
     if until is not None:
         return np.full((len(FADES), len(fan.points)), float(until))
-    crossed = np.asarray(fan.caustic_index) >= CROSSED
+    # a ray ends where J has its second zero
+    crossed = np.asarray(fan.caustic_index) >= 2
     times = np.asarray(fan.travel_time)
     ends = np.where(crossed.any(axis=1), times[np.argmax(crossed, axis=1)], np.inf)
     if speed_of(fan.body) is not None or not len(ends):
@@ -204,7 +223,7 @@ def ray_strokes(fan: RayFan, rays: int, ends: FloatArray, *, spacing: float = 0.
             begin = end
     found = [Stroke(free, RAY_COLOUR, 0.5, alpha=0.5, label="ray after detachment")] if free else []
     # the strongest part stands in the legend
-    for part, alpha in reversed([pair for pair in zip(bound, PALER, strict=True) if pair[0]]):
+    for part, alpha in reversed([pair for pair in zip(bound, (1.0, 0.6, 0.35), strict=True) if pair[0]]):
         found.append(Stroke(part, RAY_COLOUR, 0.6, alpha=alpha, label="creeping ray" if alpha == 1 else ""))
     return found
 
@@ -319,8 +338,5 @@ class LevelColours:
     def add_bar(self, figure: Any, **place: Any) -> None:
         """Colour bar, where there are two levels at least; ``place`` as for ``Figure.colorbar``."""
         if self.high > self.low:
-            bar = figure.colorbar(self.mappable, **place)
             unit = f" ({self.unit})" * (self.unit != UNKNOWN)
-            bar.set_label(f"iso-phase curves: {self.name}{unit}", fontsize=8)
-            bar.ax.tick_params(labelsize=8, width=0.5)
-            bar.outline.set_linewidth(0.5)
+            add_bar(figure, self.mappable, f"iso-phase curves: {self.name}{unit}", fontsize=8, **place)

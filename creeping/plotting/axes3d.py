@@ -5,13 +5,13 @@ the hidden part faintly; that holds for the view it was drawn for, not after tur
 """
 
 from collections.abc import Sequence
+from typing import Unpack
 
 import numpy as np
 
 from creeping._typing import Any, FloatArray
-from creeping.field.boundary import BoundaryLike
 from creeping.plotting._drawing import Drawing, View, compose
-from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, Stroke, runs
+from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, RayOptions, Stroke, runs
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowLine
@@ -24,11 +24,8 @@ def plot_rays_3d(
     *,
     ax: Any = None,
     view: View | None = None,
-    rays: int = 48,
-    until: float | None = None,
-    wavenumber: float | None = None,
-    boundary: BoundaryLike = "hard",
     legend: bool = True,
+    **shown: Unpack[RayOptions],
 ) -> Any:
     """Draw the body, its shadow line, creeping rays and iso-phase curves on matplotlib axes.
 
@@ -61,7 +58,6 @@ def plot_rays_3d(
         from matplotlib import pyplot
 
         ax = pyplot.figure(figsize=(6.4, 5.2), dpi=150).add_subplot(projection="3d")
-    shown: dict[str, Any] = {"rays": rays, "until": until, "wavenumber": wavenumber, "boundary": boundary}
     drawing = compose(line, fan, curves, view=view, **shown)
     draw(ax, drawing)
     if legend:
@@ -72,12 +68,18 @@ def plot_rays_3d(
 
 def draw(ax: Any, drawing: Drawing) -> None:
     """Draw a composed picture on 3-D axes, without legend."""
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
     # the order of drawing is ours: the body, hidden lines, visible lines by rank, arrows
     ax.computed_zorder = False
     _draw_body(ax, drawing)
     for stroke in drawing.strokes:
         _draw_stroke(ax, drawing, stroke)
-    _draw_marks(ax, drawing)
+    # not quiver: its heads are flat in space and vanish when seen from the side
+    outlines = [mark.outline(drawing.view) for mark in drawing.marks]
+    ax.add_collection3d(Poly3DCollection(outlines, facecolors=ARROW_COLOUR, linewidths=0, zorder=30))
+    for mark in drawing.marks:
+        ax.text(*mark.label(drawing.view), mark.name, zorder=30, **mark.text)
     # 3-D axes are square; a wide body may use all of the place they were given
     for artist in ax.collections:
         artist.set_clip_on(False)
@@ -133,18 +135,6 @@ def _draw_stroke(ax: Any, drawing: Drawing, stroke: Stroke) -> None:
                 zorder=2 + stroke.rank + above,
             )
             ax.add_collection3d(lines)
-
-
-def _draw_marks(ax: Any, drawing: Drawing) -> None:
-    """Draw the arrow of incidence and the triad of the coordinate axes."""
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-    marks = drawing.marks
-    # not quiver: its heads are flat in space and vanish when seen from the side
-    outlines = [mark.outline(drawing.view) for mark in marks]
-    ax.add_collection3d(Poly3DCollection(outlines, facecolors=ARROW_COLOUR, linewidths=0, zorder=30))
-    for mark in marks:
-        ax.text(*mark.label(drawing.view), mark.name, zorder=30, **mark.text)
 
 
 def _frame(ax: Any, drawing: Drawing) -> None:

@@ -1,5 +1,8 @@
 """The body in colours of decibels: of the field on it, and of the currents of the whole body at their nodes.
 
+Wave fronts on it are where Re(u e^{-i phase}) = 0 on the triangles of its mesh, joined to polylines. On an edge of a
+triangle the real part is taken as linear; fronts are half a wavelength of the wave on the body apart.
+
 Sources: Derivations, F16.
 """
 
@@ -8,31 +11,31 @@ from dataclasses import replace
 
 import numpy as np
 
-from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
+from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.field.comparison import decibels, shown_range
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
+from creeping.field.labelled import COMPONENTS
+from creeping.field.point_result import PointField
 from creeping.geometry.checks import unit_of
 from creeping.geometry.incident import PlaneWave
 from creeping.geometry.parts import why_no_rays
-from creeping.geometry.surface import Surface, normal
+from creeping.geometry.surface import Surface, normal, project
+from creeping.geometry.triangulation import Triangulation
 from creeping.plotting._drawing import Drawing, View, bare, caption, compose
-from creeping.plotting.palette import add_bar, beyond
-from creeping.plotting.pictures import chosen_backend, drawn_page, save_figure
+from creeping.plotting._strokes import Stroke
+from creeping.plotting.pages import add_bar, beyond, save_figure
+from creeping.plotting.pictures import chosen_backend, drawn_page
 from creeping.shadow.line import shadow_line
 
 NOTHING = "#b4b9bd"
 """Colour of what has no level."""
-LEAST_CELLS, MOST_CELLS = 48, 96
-"""Of the body along each side of its box."""
 WIDTH, REACH = 0.22, 2.5
 """Standard deviation, in wavelengths, of the Gaussian that smooths currents, and where it ends, in it."""
-COVERED = 0.3
-"""Share of the area about a point that nodes must stand for if there is a current."""
-BLOCK = 4000
-"""Points that are smoothed at a time."""
-INCIDENT = ("theta", "phi")
+SIDES = [[0, 1], [1, 2], [2, 0]]
+LEAST_SAMPLES = 4.5
+"""Edges of triangles, or points of a grid, a wavelength from which fronts can be told."""
 
 
 def currents_picture(
@@ -97,13 +100,13 @@ def current_levels(currents: SurfaceCurrents, points: FloatArray, incident: str 
 def _magnitudes(currents: SurfaceCurrents, points: FloatArray, incident: str | None) -> FloatArray:
     """Magnitude of the currents at points of the body (n, 3), NaN where there are none: (n,)."""
     conductor = currents.values.ndim > 1
-    if incident is not None and (incident not in INCIDENT or not conductor):
-        raise InvalidInputError(f"incident = {incident!r} is not {' or '.join(INCIDENT)}, of a conductor's currents")
+    if incident is not None and (incident not in COMPONENTS or not conductor):
+        raise InvalidInputError(f"incident = {incident!r} is not {' or '.join(COMPONENTS)}, of a conductor's currents")
     values, covered = _currents_at(currents, points)
     size = np.abs(values)
     if conductor:
         each = np.linalg.norm(size, axis=1)
-        size = np.sqrt(np.mean(each**2, axis=1)) if incident is None else each[:, INCIDENT.index(incident)]
+        size = np.sqrt(np.mean(each**2, axis=1)) if incident is None else each[:, COMPONENTS.index(incident)]
     elif currents.boundary.kind == "soft":
         size = size / currents.wavenumber
     return np.where(covered, size, np.nan)
@@ -126,8 +129,8 @@ def _currents_at(currents: SurfaceCurrents, points: FloatArray) -> tuple[Complex
     tree = cKDTree(currents.points)
     total, share = np.zeros((len(points), *currents.values.shape[1:]), dtype=complex), np.zeros(len(points))
     flat = currents.values.reshape(len(currents.points), -1)
-    for first in range(0, len(points), BLOCK):
-        part = slice(first, first + BLOCK)
+    for first in range(0, len(points), 4000):
+        part = slice(first, first + 4000)
         pairs = cKDTree(points[part]).sparse_distance_matrix(tree, REACH * width, output_type="ndarray")
         row, node = pairs["i"] + first, pairs["j"]
         # not what is on the other side of a thin body
@@ -141,35 +144,14 @@ def _currents_at(currents: SurfaceCurrents, points: FloatArray) -> tuple[Complex
         summed = csr_array((weight * np.exp(1j * phase), (row - first, node)), shape=shape)
         total[part] = (summed @ flat).reshape(count, *currents.values.shape[1:])
         share[part] = np.bincount(row - first, weight, count)
-    return total, share > COVERED
+    # nodes stand for so much of the area about a point if there is a current
+    return total, share > 0.3
 
 
 def cells_of(body: Surface, wavenumber: float) -> int:
-    """Cells along each side of a body's box, about eight a wavelength."""
+    """Cells along each side of a body's box, about eight a wavelength, within 48 to 96."""
     side = float(np.cbrt(np.prod(np.diff(body.bounds, axis=0))))
-    return int(np.clip(8 * side * wavenumber / (2 * np.pi), LEAST_CELLS, MOST_CELLS))
-
-
-def painted(drawing: Drawing, levels: FloatArray, *, span: float, label: str, bare: str, backend: str, dpi: int) -> Any:
-    """Figure of a body with levels (n,), dB, at the vertices of its mesh, and a bar of colours; ``bare`` names NaN."""
-    finite = levels[np.isfinite(levels)]
-    # neither a null nor a caustic of a few points stretches the colours
-    ends = np.percentile(finite, [1.0, 99.8]) if len(finite) else (-np.inf, np.inf)
-    low, high = shown_range([np.clip(finite, *ends)], span, step=2.0)
-    colours = _colours(low, high)
-    paint = colours.to_rgba(np.nan_to_num(levels, nan=low, posinf=high, neginf=low))[:, :3]
-    without = np.isnan(levels)
-    handles = []
-    if np.any(without):
-        from matplotlib.colors import to_rgb
-        from matplotlib.patches import Patch
-
-        paint[without] = to_rgb(NOTHING)
-        handles.append(Patch(color=NOTHING, label=bare))
-    figure, place = drawn_page(replace(drawing, paint=np.asarray(paint)), backend, dpi)
-    drawing.add_legend(figure, *handles)
-    add_bar(figure, colours, label, extend=beyond(levels, low, high), fontsize=8, cax=figure.add_axes(place))
-    return figure
+    return int(np.clip(8 * side * wavenumber / (2 * np.pi), 48, 96))
 
 
 def save_painted(
@@ -183,14 +165,126 @@ def save_painted(
     backend: str,
     dpi: int,
 ) -> str:
-    """Write the figure of `painted`, and return its backend."""
-    figure = painted(drawing, levels, span=span, label=label, bare=bare, backend=backend, dpi=dpi)
+    """Write a figure of a body with levels (n,), dB, at the vertices of its mesh, and a bar of colours.
+
+    ``bare`` names what is NaN. Returns the backend.
+    """
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize, to_rgb
+    from matplotlib.patches import Patch
+
+    finite = levels[np.isfinite(levels)]
+    # neither a null nor a caustic of a few points stretches the colours
+    ends = np.percentile(finite, [1.0, 99.8]) if len(finite) else (-np.inf, np.inf)
+    low, high = shown_range([np.clip(finite, *ends)], span, step=2.0)
+    colours = ScalarMappable(Normalize(low, high), "magma")
+    paint = colours.to_rgba(np.nan_to_num(levels, nan=low, posinf=high, neginf=low))[:, :3]
+    without = np.isnan(levels)
+    handles = []
+    if np.any(without):
+        paint[without] = to_rgb(NOTHING)
+        handles.append(Patch(color=NOTHING, label=bare))
+    figure, place = drawn_page(replace(drawing, paint=np.asarray(paint)), backend, dpi)
+    drawing.add_legend(figure, *handles)
+    add_bar(figure, colours, label, extend=beyond(levels, low, high), fontsize=8, cax=figure.add_axes(place))
     save_figure(figure, path, dpi)
     return backend
 
 
-def _colours(low: float, high: float) -> Any:
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
+def at_phase(wave: ComplexArray, phase: float) -> FloatArray:
+    """The wave as it is when omega t = phase, radians: Re(u e^{-i phase}) of u (...).
 
-    return ScalarMappable(Normalize(low, high), "magma")
+    Examples
+    --------
+    >>> import numpy as np
+    >>> at_phase(np.array([1.0, 1j]), np.pi / 2).round(12).tolist()
+    [0.0, 1.0]
+    """
+    return np.asarray(wave.real * np.cos(phase) + wave.imag * np.sin(phase))
+
+
+def samples_a_wave(mesh: Triangulation, wavenumber: float) -> float:
+    """Edges of a mesh a wavelength, by its median edge."""
+    sides = mesh.vertices[mesh.triangles[:, SIDES]]
+    return 2 * np.pi / (wavenumber * float(np.median(np.linalg.norm(np.diff(sides, axis=2), axis=-1))))
+
+
+def front_strokes(
+    body: Surface,
+    mesh: Triangulation,
+    wave: ComplexArray,
+    known: BoolArray,
+    *,
+    wavenumber: float,
+    phase: float = 0.0,
+) -> list[Stroke]:
+    """Wave fronts of values (n,) at the vertices of a body's mesh, on triangles whose corners are all known (n,).
+
+    Raises
+    ------
+    InvalidInputError
+        If the mesh is too coarse for the wavelength.
+    """
+    edges = mesh.triangles[:, SIDES]
+    there = samples_a_wave(mesh, wavenumber)
+    if there < LEAST_SAMPLES:
+        raise InvalidInputError(
+            f"wave fronts on a mesh of {there:.2g} edges a wavelength; {LEAST_SAMPLES:g} are the least: give "
+            f"{LEAST_SAMPLES / there:.2g} times the cells, or leave fronts out"
+        )
+    real = at_phase(np.where(known, wave, 0.0), phase)
+    edges = edges[np.all(known[mesh.triangles], axis=1)]
+    # a corner at 0 counts as positive: each triangle is crossed by none of its edges or by two
+    crossed = (real[edges[..., 0]] < 0) != (real[edges[..., 1]] < 0)
+    pairs = np.sort(edges[crossed], axis=1).reshape(-1, 2, 2)
+    if not len(pairs):
+        return []
+    ends, place = np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True)
+    low, high = real[ends[:, 0]], real[ends[:, 1]]
+    share = (low / (low - high))[:, None]
+    points = project(body, (1 - share) * mesh.vertices[ends[:, 0]] + share * mesh.vertices[ends[:, 1]])
+    lines = [points[chain] for chain in chains(place.reshape(-1, 2))]
+    return [Stroke(lines, "#00c2d1", 0.6, alpha=0.8, label="wave fronts", rank=1, through=False)]
+
+
+def chains(segments: IntArray) -> list[IntArray]:
+    """Polylines of segments (m, 2) between nodes that belong to two of them at most; a closed one ends as it begins.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> [chain.tolist() for chain in chains(np.array([[4, 7], [1, 2], [2, 4], [8, 9], [9, 5], [5, 8]]))]
+    [[1, 2, 4, 7], [8, 9, 5, 8]]
+    """
+    at: dict[int, list[int]] = {}
+    for number, (one, other) in enumerate(segments.tolist()):
+        at.setdefault(one, []).append(number)
+        at.setdefault(other, []).append(number)
+    left = np.ones(len(segments), dtype=bool)
+    found = []
+    # open ones from their ends, then what is closed
+    starts = [node for node, here in at.items() if len(here) == 1]
+    for start in sorted(starts) + segments[:, 0].tolist():
+        nodes = [start]
+        while ahead := [number for number in at[nodes[-1]] if left[number]]:
+            left[ahead[0]] = False
+            one, other = segments[ahead[0]].tolist()
+            nodes.append(other if one == nodes[-1] else one)
+        if len(nodes) > 1:
+            found.append(np.array(nodes))
+    return found
+
+
+def with_fronts(drawing: Drawing, field: PointField, phase: float) -> Drawing:
+    """A drawing with the wave fronts of a field at the vertices of its mesh, where that is OK, below its other strokes.
+
+    Raises
+    ------
+    InvalidInputError
+        If the mesh is too coarse for the wavelength.
+    """
+    known = field.ok & np.isfinite(field.values)
+    asked: dict[str, Any] = {"wavenumber": field.wavenumber, "phase": phase}
+    return replace(
+        drawing, strokes=front_strokes(drawing.body, drawing.mesh, field.values, known, **asked) + drawing.strokes
+    )

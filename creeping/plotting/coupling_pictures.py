@@ -1,43 +1,35 @@
-"""Pictures of how a port on a hard body couples to the rest of it: decibels as colours of the surface.
+"""Pictures of couplings: of a port to the rest of a hard body as colours, of ports as a matrix, of sources afar.
 
-Shown is |u| of a unit point source e^{ikr}/(4 pi r) at the port, as `creeping.field.ports.port_map` has it.
-
-Also here: wave fronts on a body: where Re(u e^{-i phase}) = 0 on the triangles of its mesh, joined to polylines.
-
-On an edge of a triangle the real part is taken as linear; fronts are half a wavelength of the wave on the body apart.
+On the body |u| of a unit point source e^{ikr}/(4 pi r) at the port is shown, as `creeping.field.ports.port_map` has it.
 
 Sources: Derivations, F25.
 """
 
 import os
-from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
+from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import BoundaryLike
-from creeping.field.comparison import decibels
+from creeping.field.comparison import decibels, shown_range
 from creeping.field.labelled import power
-from creeping.field.point_result import FieldStatus, PointField
+from creeping.field.point_result import FieldStatus
 from creeping.field.ports.port_map import PortField, port_field
 from creeping.geometry.piecewise import drawn_mesh
 from creeping.geometry.surface import Surface, normal, project, size
-from creeping.geometry.triangulation import Triangulation
+from creeping.plotting import pages
+from creeping.plotting._cut_angles import cut_angles
 from creeping.plotting._drawing import Drawing, View, shadow_view
 from creeping.plotting._strokes import LevelColours, Stroke
-from creeping.plotting.coloured_body import cells_of, save_painted
+from creeping.plotting.coloured_body import cells_of, save_painted, with_fronts
+from creeping.plotting.far_cuts import Curve, draw_cut, heights_of
 from creeping.plotting.pictures import chosen_backend
 
-RING = 0.05
-"""Radius of the ring round the source, in body sizes."""
-SOURCE = "#111111"
-
-COLOUR, FRONT_WIDTH = "#00c2d1", 0.6
-LEAST_SAMPLES = 4.5
-"""Edges of triangles, or points of a grid, a wavelength from which fronts can be told."""
-
-SIDES = [[0, 1], [1, 2], [2, 0]]
+if TYPE_CHECKING:
+    from creeping.field.ports.coupling_result import Coupling
+    from creeping.field.sources import SourcePattern
 
 
 def coupling_picture(
@@ -91,14 +83,17 @@ def coupling_picture(
     field = port_field(body, source, mesh.vertices, wavenumber=wavenumber, boundary=boundary, order=order)
     n = normal(body, field.source)
     camera = shadow_view(n) if view is None else view
-    ring = Stroke([_ring(body, field.source, n)], SOURCE, 2.0, label="source", rank=2)
+    ring = Stroke([_ring(body, field.source, n)], "#111111", 2.0, label="source", rank=2)
     drawing = Drawing(body, None, camera, mesh, normals, [ring], LevelColours.of(()))
     if fronts:
         drawing = with_fronts(drawing, field, phase)
     unit = power(field.length_unit, -1)
     label = f"20 log$_{{10}}$|u| (dB re 1 {unit})\nk = {field.wavenumber:g}/{field.length_unit}, {field.boundary}"
-    levels = coupling_levels(field)
-    return save_painted(path, drawing, levels, span=span, label=label, bare=_bare(field), backend=backend, dpi=dpi)
+    finite = np.isfinite(field.values)
+    counts = {s.name: int(np.sum((field.status == s) & finite)) for s in FieldStatus if s != FieldStatus.OK}
+    shares = (f"{100 * count / field.size:.2g} % {name}" for name, count in counts.items() if count)
+    look: dict[str, Any] = {"bare": "not OK: " + (", ".join(shares) or "none"), "backend": backend, "dpi": dpi}
+    return save_painted(path, drawing, coupling_levels(field), span=span, label=label, **look)
 
 
 def coupling_levels(field: PortField) -> FloatArray:
@@ -107,117 +102,98 @@ def coupling_levels(field: PortField) -> FloatArray:
     return np.where(field.ok | at_source, decibels(field.values), np.nan)
 
 
-def _bare(field: PortField) -> str:
-    """What is grey, by status."""
-    finite = np.isfinite(field.values)
-    counts = {s.name: int(np.sum((field.status == s) & finite)) for s in FieldStatus if s != FieldStatus.OK}
-    share = {name: 100 * count / field.size for name, count in counts.items() if count}
-    return "not OK: " + (", ".join(f"{value:.2g} % {name}" for name, value in share.items()) or "none")
-
-
 def _ring(body: Surface, point: FloatArray, n: FloatArray) -> FloatArray:
-    """Closed curve (k, 3) on the body round a point."""
+    """Closed curve (k, 3) on the body round a point, of a twentieth of the body's size."""
     one = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
     one /= np.linalg.norm(one)
     angle = np.linspace(0, 2 * np.pi, 49)[:, None]
-    radius = RING * size(body)
+    radius = 0.05 * size(body)
     return project(body, point + radius * (np.cos(angle) * one + np.sin(angle) * np.cross(n, one)))
 
 
-def at_phase(wave: ComplexArray, phase: float) -> FloatArray:
-    """The wave as it is when omega t = phase, radians: Re(u e^{-i phase}) of u (...).
+def plot_coupling(found: "Coupling", ax: Any = None, *, span: float = 60.0, legend: bool | None = None) -> Any:
+    """Draw a coupling matrix: 20 log10 of each entry's size, what is not OK crossed out, the diagonal left empty.
 
-    Examples
-    --------
-    >>> import numpy as np
-    >>> at_phase(np.array([1.0, 1j]), np.pi / 2).round(12).tolist()
-    [0.0, 1.0]
+    Parameters
+    ----------
+    found : Coupling
+    ax : matplotlib.axes.Axes, optional
+        By default those of a new figure.
+    span : float, dB
+        Range below the highest value.
+    legend : bool
+        By default on a new figure only.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
     """
-    return np.asarray(wave.real * np.cos(phase) + wave.imag * np.sin(phase))
-
-
-def samples_a_wave(mesh: Triangulation, wavenumber: float) -> float:
-    """Edges of a mesh a wavelength, by its median edge."""
-    sides = mesh.vertices[mesh.triangles[:, SIDES]]
-    return 2 * np.pi / (wavenumber * float(np.median(np.linalg.norm(np.diff(sides, axis=2), axis=-1))))
-
-
-def front_strokes(
-    body: Surface,
-    mesh: Triangulation,
-    wave: ComplexArray,
-    known: BoolArray,
-    *,
-    wavenumber: float,
-    phase: float = 0.0,
-) -> list[Stroke]:
-    """Wave fronts of values (n,) at the vertices of a body's mesh, on triangles whose corners are all known (n,).
-
-    Raises
-    ------
-    InvalidInputError
-        If the mesh is too coarse for the wavelength.
-    """
-    edges = mesh.triangles[:, SIDES]
-    there = samples_a_wave(mesh, wavenumber)
-    if there < LEAST_SAMPLES:
-        raise InvalidInputError(
-            f"wave fronts on a mesh of {there:.2g} edges a wavelength; {LEAST_SAMPLES:g} are the least: give "
-            f"{LEAST_SAMPLES / there:.2g} times the cells, or leave fronts out"
-        )
-    real = at_phase(np.where(known, wave, 0.0), phase)
-    edges = edges[np.all(known[mesh.triangles], axis=1)]
-    # a corner at 0 counts as positive: each triangle is crossed by none of its edges or by two
-    crossed = (real[edges[..., 0]] < 0) != (real[edges[..., 1]] < 0)
-    pairs = np.sort(edges[crossed], axis=1).reshape(-1, 2, 2)
-    if not len(pairs):
-        return []
-    ends, place = np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True)
-    low, high = real[ends[:, 0]], real[ends[:, 1]]
-    share = (low / (low - high))[:, None]
-    points = project(body, (1 - share) * mesh.vertices[ends[:, 0]] + share * mesh.vertices[ends[:, 1]])
-    lines = [points[chain] for chain in chains(place.reshape(-1, 2))]
-    return [Stroke(lines, COLOUR, FRONT_WIDTH, alpha=0.8, label="wave fronts", rank=1, through=False)]
-
-
-def with_fronts(drawing: Drawing, field: PointField, phase: float) -> Drawing:
-    """A drawing with the wave fronts of a field at the vertices of its mesh, where that is OK, below its other strokes.
-
-    Raises
-    ------
-    InvalidInputError
-        If the mesh is too coarse for the wavelength.
-    """
-    known = field.ok & np.isfinite(field.values)
-    asked: dict[str, Any] = {"wavenumber": field.wavenumber, "phase": phase}
-    return replace(
-        drawing, strokes=front_strokes(drawing.body, drawing.mesh, field.values, known, **asked) + drawing.strokes
+    count = len(found.ports)
+    levels = np.where(np.isfinite(found.values), decibels(np.nan_to_num(found.values)), np.nan)
+    low, high = shown_range([levels], span)
+    fresh, ax = pages.axes_or_new(ax, (5.6, 4.8))
+    image = ax.imshow(levels, vmin=low, vmax=high, cmap="cividis", interpolation="nearest")
+    # more numbers, or more crosses, cannot be read
+    numbered = count <= 12
+    if numbered:
+        # dark on light and light on dark
+        for row, column in zip(*np.nonzero(np.isfinite(levels)), strict=True):
+            colour = "black" if levels[row, column] > 0.5 * (low + high) else "white"
+            text = pages.minus(round(levels[row, column]))
+            ax.text(column, row, text, ha="center", va="center", fontsize=7, color=colour)
+    doubtful = ~found.ok & np.isfinite(found.values)
+    if count <= 60 and doubtful.any():
+        rows, columns = np.nonzero(doubtful)
+        ax.plot(columns, rows, "x", color="#d55e00", markersize=9 if numbered else 4, label="not OK")
+    per = found.to_xarray()["total"].attrs["units"]
+    per = per if per.startswith("1/") else f"1 {per}"
+    pages.add_bar(
+        ax.figure, image, f"20 log$_{{10}}$ (dB re {per})", extend=pages.beyond(levels, low, high), fontsize=9, ax=ax
     )
+    ax.set_xlabel("receiver", fontsize=9)
+    ax.set_ylabel("source", fontsize=9)
+    ax.tick_params(labelsize=8, width=0.5)
+    ax.xaxis.get_major_locator().set_params(integer=True)
+    ax.yaxis.get_major_locator().set_params(integer=True)
+    return pages.finished(ax, fresh, pages.wave_title(found, found.length_unit), legend)
 
 
-def chains(segments: IntArray) -> list[IntArray]:
-    """Polylines of segments (m, 2) between nodes that belong to two of them at most; a closed one ends as it begins.
+def plot_pattern(found: "SourcePattern", ax: Any = None, *, span: float = 60.0, legend: bool | None = None) -> Any:
+    """Draw far fields of sources in decibels against the angle of a cut, one curve a source, with their errors.
 
-    Examples
-    --------
-    >>> import numpy as np
-    >>> [chain.tolist() for chain in chains(np.array([[4, 7], [1, 2], [2, 4], [8, 9], [9, 5], [5, 8]]))]
-    [[1, 2, 4, 7], [8, 9, 5, 8]]
+    Parameters
+    ----------
+    found : SourcePattern
+        In directions of one plane through the origin, or of one θ; of up to six sources.
+    ax : matplotlib.axes.Axes, optional
+        By default those of a new figure; polar ones are drawn round.
+    span : float, dB
+        Range below the highest value.
+    legend : bool
+        By default on a new figure only.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InvalidInputError
+        If the directions are on no cut, or sources are too many.
     """
-    at: dict[int, list[int]] = {}
-    for number, (one, other) in enumerate(segments.tolist()):
-        at.setdefault(one, []).append(number)
-        at.setdefault(other, []).append(number)
-    left = np.ones(len(segments), dtype=bool)
-    found = []
-    # open ones from their ends, then what is closed
-    starts = [node for node, here in at.items() if len(here) == 1]
-    for start in sorted(starts) + segments[:, 0].tolist():
-        nodes = [start]
-        while ahead := [number for number in at[nodes[-1]] if left[number]]:
-            left[ahead[0]] = False
-            one, other = segments[ahead[0]].tolist()
-            nodes.append(other if one == nodes[-1] else one)
-        if len(nodes) > 1:
-            found.append(np.array(nodes))
-    return found
+    count, most = len(found.sources), len(pages.COLOURS)
+    if count > most:
+        raise InvalidInputError(f"{count} sources in one picture; draw {most} at most: source_pattern of some of them")
+    cut = cut_angles(found.directions)
+    curves = []
+    for number, (values, off) in enumerate(zip(found.values.T, found.error.T, strict=True)):
+        size = np.abs(values)
+        band = decibels(np.stack([np.maximum(size - off, 0.0), size + off]))
+        label = f"source at ({', '.join(f'{x:.4g}' for x in found.sources[number])})"
+        curve = Curve(label, decibels(values), pages.curve_style(number), band, ~found.ok[:, number])
+        curves.append(curve.ordered(cut.order, label))
+    heights = heights_of(curves, span)
+    fresh, ax = pages.axes_or_new(ax, pages.PAGE)
+    level = "20 log$_{10}$|F| (dB re no body)"
+    draw_cut(ax, cut.values[cut.order], curves, heights, level=level, angle_name=cut.name)
+    return pages.finished(ax, fresh, pages.wave_title(found, found.length_unit), legend)

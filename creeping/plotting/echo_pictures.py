@@ -1,4 +1,7 @@
-"""Pictures of an echo: against angle or frequency with the band of its error, as a map of both, and in range."""
+"""Pictures of an echo: against angle or frequency with the band of its error, as a map of both, and in range.
+
+Also here: pictures that responses to a pulse draw of themselves: level against delay or range.
+"""
 
 import os
 from dataclasses import replace
@@ -8,22 +11,19 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.comparison import shown_range
+from creeping.field.comparison import decibels, shown_range
 from creeping.field.frequency import suited
 from creeping.field.impulse import range_profile
-from creeping.plotting.far_cuts import Curve, band_words, draw_cut, dressed, heights_of, minus
-from creeping.plotting.palette import GREY, add_bar, beyond, curve_style
-from creeping.plotting.pictures import add_legend, axes_or_new, new_figure, save_figure
+from creeping.plotting import pages
+from creeping.plotting.far_cuts import Curve, band_words, draw_cut, heights_of
 
 if TYPE_CHECKING:
     from creeping.field.comparison import Comparison
     from creeping.field.echo import Echo
-    from creeping.field.impulse import RangeProfile
+    from creeping.field.impulse import ImpulseResponse, RangeProfile
 
 SPAN = 60.0
 """Range of levels, dB."""
-VEIL = 0.7
-"""How much white hides of what is unresolved."""
 
 
 def echo_cut_picture(
@@ -45,13 +45,10 @@ def echo_cut_picture(
     CreepingError
         If nothing can be drawn, or the file cannot be written.
     """
-    figure = new_figure((6.4, 4.2) if kind == "cartesian" else (6.4, 6.4))
-    figure.set_layout_engine("constrained")
-    ax = figure.add_subplot(projection="polar" if kind == "polar" else None)
-    draw_echo_cut(ax, echo)
-    ax.set_title(title, fontsize=9, parse_math=False)
-    add_legend(ax, fresh=True)
-    save_figure(figure, path, dpi)
+    with pages.written_figure(path, pages.PAGE if kind == "cartesian" else (6.4, 6.4), dpi) as figure:
+        ax = figure.add_subplot(projection="polar" if kind == "polar" else None)
+        draw_echo_cut(ax, echo)
+        pages.finished(ax, True, title)
 
 
 def draw_echo_cut(ax: Any, echo: "Echo", span: float = SPAN) -> None:
@@ -64,13 +61,10 @@ def draw_echo_cut(ax: Any, echo: "Echo", span: float = SPAN) -> None:
 
 def echo_band_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str = "", dpi: int = 200) -> None:
     """Write a PNG of an echo against frequency at its first angle; arguments as of `echo_cut_picture`."""
-    figure = new_figure((6.4, 4.2))
-    figure.set_layout_engine("constrained")
-    ax = figure.add_subplot()
-    draw_echo_band(ax, echo)
-    ax.set_title(title, fontsize=9, parse_math=False)
-    add_legend(ax, fresh=True)
-    save_figure(figure, path, dpi)
+    with pages.written_figure(path, pages.PAGE, dpi) as figure:
+        ax = figure.add_subplot()
+        draw_echo_band(ax, echo)
+        pages.finished(ax, True, title)
 
 
 def draw_echo_band(ax: Any, echo: "Echo", span: float = SPAN) -> None:
@@ -90,10 +84,10 @@ def draw_echo_band(ax: Any, echo: "Echo", span: float = SPAN) -> None:
         ax.plot(x, np.maximum(curve.levels, floor), label=curve.label, **curve.style)
     doubtful = echo.unresolved[:, 0].any(axis=0)
     if doubtful.any():
-        ax.plot(x[doubtful], np.full(doubtful.sum(), low), "|", color=GREY, clip_on=False, label="unresolved")
+        ax.plot(x[doubtful], np.full(doubtful.sum(), low), "|", color=pages.GREY, clip_on=False, label="unresolved")
     ax.set_xlim(x[0], x[-1])
     ax.set_ylim(low, high)
-    dressed(ax, f"frequency ({unit})", _level(echo))
+    pages.dressed(ax, f"frequency ({unit})", _level(echo))
 
 
 def echo_map_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str = "", dpi: int = 200) -> None:
@@ -105,16 +99,14 @@ def echo_map_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str =
 
     count = len(echo.channels)
     heights = shown_range([echo.levels()], SPAN)
-    figure = new_figure((6.4, 0.6 + 2.9 * count))
-    figure.set_layout_engine("constrained")
-    for number, channel in enumerate(echo.channels):
-        ax = figure.add_subplot(count, 1, number + 1)
-        draw_echo_map(ax, echo, number, heights)
-        ax.set_title(channel if number else f"{title}\n{channel}", fontsize=9, parse_math=False)
-    if echo.unresolved.any():
-        patch = Patch(facecolor="white", edgecolor=GREY, linewidth=0.5, label="veiled: unresolved")
-        figure.legend(handles=[patch], loc="outside lower center", frameon=False, fontsize=8)
-    save_figure(figure, path, dpi)
+    with pages.written_figure(path, (6.4, 0.6 + 2.9 * count), dpi) as figure:
+        for number, channel in enumerate(echo.channels):
+            ax = figure.add_subplot(count, 1, number + 1)
+            draw_echo_map(ax, echo, number, heights)
+            ax.set_title(channel if number else f"{title}\n{channel}", fontsize=9, parse_math=False)
+        if echo.unresolved.any():
+            patch = Patch(facecolor="white", edgecolor=pages.GREY, linewidth=0.5, label="veiled: unresolved")
+            figure.legend(handles=[patch], loc="outside lower center", frameon=False, fontsize=8)
 
 
 def draw_echo_map(ax: Any, echo: "Echo", number: int, heights: tuple[float, float]) -> None:
@@ -129,10 +121,10 @@ def draw_echo_map(ax: Any, echo: "Echo", number: int, heights: tuple[float, floa
     image = ax.pcolormesh(*at, grid.T, vmin=low, vmax=high, cmap="cividis", shading="nearest")
     doubtful = echo.unresolved[number]
     veil = np.ma.masked_where(~doubtful, np.ones(doubtful.shape)).T
-    ax.pcolormesh(*at, veil, cmap=ListedColormap(["white"]), alpha=VEIL, shading="nearest")
-    dressed(ax, f"{echo.angle_name} (degrees)", f"frequency ({unit})")
+    ax.pcolormesh(*at, veil, cmap=ListedColormap(["white"]), alpha=0.7, shading="nearest")
+    pages.dressed(ax, f"{echo.angle_name} (degrees)", f"frequency ({unit})")
     ax.grid(visible=False)
-    add_bar(ax.figure, image, _level(echo), extend=beyond(levels, low, high), fontsize=9, ax=ax)
+    pages.add_bar(ax.figure, image, _level(echo), extend=pages.beyond(levels, low, high), fontsize=9, ax=ax)
 
 
 def plot_echo(
@@ -167,17 +159,13 @@ def plot_echo(
     number = 0 if channel is None else echo.channels.index(channel) if channel in echo.channels else -1
     if number < 0:
         raise InvalidInputError(f"channel {channel!r} is not among {', '.join(echo.channels)}")
-    fresh, ax = axes_or_new(ax, (6.4, 4.2))
+    fresh, ax = pages.axes_or_new(ax, pages.PAGE)
     if angles > 1 and waves > 1:
         draw_echo_map(ax, echo, number, shown_range([echo.levels()[number]], span))
-        if fresh:
-            ax.set_title(f"{echo.channels[number]}; veiled: unresolved", fontsize=9, parse_math=False)
-        return ax
-    if angles > 1:
-        draw_echo_cut(ax, echo, span)
-    else:
-        draw_echo_band(ax, echo, span)
-    add_legend(ax, fresh, legend)
+        return pages.finished(ax, fresh, f"{echo.channels[number]}; veiled: unresolved", legend=False)
+    draw = draw_echo_cut if angles > 1 else draw_echo_band
+    draw(ax, echo, span)
+    pages.add_legend(ax, fresh, legend)
     return ax
 
 
@@ -194,27 +182,30 @@ def range_picture(
 
     Beside them stands the window's own profile about the strongest echo: what is no higher may be its side lobe.
     """
-    figure = new_figure((6.4, 4.2))
-    figure.set_layout_engine("constrained")
-    ax = figure.add_subplot()
-    curves = {channel: echo.levels(found.values) for channel, found in profiles.items()}
-    low, high = shown_range(curves.values(), SPAN)
-    # the legend lists what was drawn last first
-    for number, (channel, found) in reversed(list(enumerate(profiles.items()))):
-        ax.plot(found.range, np.maximum(curves[channel], low - 1), label=channel, **curve_style(number))
-    strongest = max(profiles.values(), key=lambda found: float(np.max(np.abs(found.values))))
-    alone = np.abs(range_profile(np.ones(len(echo.wavenumbers)), echo.wavenumbers).values)
-    size = np.abs(strongest.values)
-    alone = np.roll(alone, int(np.argmax(size)) - int(np.argmax(alone))) * float(np.max(size))
-    look: dict[str, Any] = {"color": GREY, "alpha": 0.2, "linewidth": 0, "label": "strongest echo with side lobes"}
-    ax.fill_between(strongest.range, low - 1, np.maximum(echo.levels(alone), low - 1), **look)
-    reach = next(iter(profiles.values())).range
-    ax.set_xlim(max(span[0], reach[0]), min(span[1], reach[-1]))
-    ax.set_ylim(low, high)
-    viewer = "radar" if echo.quantity == "rcs" else "sonar"
-    dressed(ax, f"range along the line of sight (m), away from the {viewer}", _level(echo), title)
-    add_legend(ax, fresh=True)
-    save_figure(figure, path, dpi)
+    with pages.written_figure(path, pages.PAGE, dpi) as figure:
+        ax = figure.add_subplot()
+        curves = {channel: echo.levels(found.values) for channel, found in profiles.items()}
+        low, high = shown_range(curves.values(), SPAN)
+        # the legend lists what was drawn last first
+        for number, (channel, found) in reversed(list(enumerate(profiles.items()))):
+            ax.plot(found.range, np.maximum(curves[channel], low - 1), label=channel, **pages.curve_style(number))
+        strongest = max(profiles.values(), key=lambda found: float(np.max(np.abs(found.values))))
+        alone = np.abs(range_profile(np.ones(len(echo.wavenumbers)), echo.wavenumbers).values)
+        size = np.abs(strongest.values)
+        alone = np.roll(alone, int(np.argmax(size)) - int(np.argmax(alone))) * float(np.max(size))
+        look: dict[str, Any] = {
+            "color": pages.GREY,
+            "alpha": 0.2,
+            "linewidth": 0,
+            "label": "strongest echo with side lobes",
+        }
+        ax.fill_between(strongest.range, low - 1, np.maximum(echo.levels(alone), low - 1), **look)
+        reach = next(iter(profiles.values())).range
+        ax.set_xlim(max(span[0], reach[0]), min(span[1], reach[-1]))
+        ax.set_ylim(low, high)
+        viewer = "radar" if echo.quantity == "rcs" else "sonar"
+        pages.dressed(ax, f"range along the line of sight (m), away from the {viewer}", _level(echo))
+        pages.finished(ax, True, title)
 
 
 def comparison_picture(
@@ -238,22 +229,20 @@ def comparison_picture(
     """
     band = len(echo.wavenumbers) > 1
     scale, unit = suited(float(echo.hertz.max())) if band else (1.0, "degrees")
-    figure = new_figure((6.4, 5.6))
-    figure.set_layout_engine("constrained")
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
-    # the legend lists what was drawn last first
-    for number, (channel, found) in reversed(list(enumerate(comparisons.items()))):
-        x, style = found.values / scale, curve_style(number)
-        broad = {"linewidth": 3.2, "alpha": 0.3, "zorder": 1.9}
-        above.plot(x, found.reference, label=f"{channel}, given", **style | broad)
-        above.plot(x, found.levels, label=channel, **style)
-        below.plot(x, found.residual, label=f"_{channel}", **style)
-    below.axhline(0.0, color=GREY, linewidth=0.6)
-    below.margins(x=0)
-    dressed(above, "", _level(echo), title)
-    dressed(below, f"frequency ({unit})" if band else f"{echo.angle_name} ({unit})", "residual (dB)")
-    add_legend(above, fresh=True)
-    save_figure(figure, path, dpi)
+    with pages.written_figure(path, (6.4, 5.6), dpi) as figure:
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
+        # the legend lists what was drawn last first
+        for number, (channel, found) in reversed(list(enumerate(comparisons.items()))):
+            x, style = found.values / scale, pages.curve_style(number)
+            broad = {"linewidth": 3.2, "alpha": 0.3, "zorder": 1.9}
+            above.plot(x, found.reference, label=f"{channel}, given", **style | broad)
+            above.plot(x, found.levels, label=channel, **style)
+            below.plot(x, found.residual, label=f"_{channel}", **style)
+        below.axhline(0.0, color=pages.GREY, linewidth=0.6)
+        below.margins(x=0)
+        pages.dressed(above, "", _level(echo))
+        pages.dressed(below, f"frequency ({unit})" if band else f"{echo.angle_name} ({unit})", "residual (dB)")
+        pages.finished(above, True, title)
 
 
 def _curves(echo: "Echo", at: tuple[Any, Any]) -> list[Curve]:
@@ -262,14 +251,16 @@ def _curves(echo: "Echo", at: tuple[Any, Any]) -> list[Curve]:
     for number, channel in enumerate(echo.channels):
         here = (number, *at)
         finite: FloatArray = np.where(np.isposinf(levels[here]), np.nan, levels[here])
-        found.append(Curve(channel, finite, curve_style(number), bounds[(slice(None), *here)], echo.unresolved[here]))
+        found.append(
+            Curve(channel, finite, pages.curve_style(number), bounds[(slice(None), *here)], echo.unresolved[here])
+        )
     return found
 
 
 def _told_if_low(curves: list[Curve], low: float) -> list[Curve]:
     """Curves, with a word in the legend for those that lie below the picture as a whole."""
     return [
-        replace(curve, label=f"{curve.label}, below {minus(low)} dB")
+        replace(curve, label=f"{curve.label}, below {pages.minus(low)} dB")
         if np.nanmax(curve.levels, initial=-np.inf) < low
         else curve
         for curve in curves
@@ -279,3 +270,110 @@ def _told_if_low(curves: list[Curve], low: float) -> list[Curve]:
 def _level(echo: "Echo") -> str:
     name, unit = echo.level_name
     return f"{name} ({unit})"
+
+
+def plot_impulse(
+    found: "ImpulseResponse",
+    ax: Any = None,
+    *,
+    start: float | None = None,
+    end: float | None = None,
+    span: float = SPAN,
+    legend: bool | None = None,
+) -> Any:
+    """Draw the envelope of a response in decibels against the delay, and the bound of its error as a dotted line.
+
+    Parameters
+    ----------
+    found : ImpulseResponse
+        Of one field or up to six.
+    ax : matplotlib.axes.Axes, optional
+        By default those of a new figure.
+    start, end : float, optional
+        Delays drawn, in the unit of the response; by default all.
+    span : float, dB
+        Range below the highest value.
+    legend : bool
+        By default on a new figure only.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InvalidInputError
+        If there are more responses than can be told apart, or nothing lies between ``start`` and ``end``.
+    """
+    envelope = np.reshape(found.envelope, (len(found.delay), -1))
+    if envelope.shape[1] > len(pages.COLOURS):
+        raise InvalidInputError(
+            f"{envelope.shape[1]} responses in one picture; draw {len(pages.COLOURS)} at most, or one by one"
+        )
+    low, high = _ends(found.delay, start, end)
+    seconds = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
+    scale, unit = (1.0, found.unit) if found.unit != "s" else suited(max(abs(low), abs(high)), seconds)
+    shown = (found.delay >= low) & (found.delay <= high)
+    levels = decibels(envelope)
+    heights = shown_range([levels[shown]], span)
+    fresh, ax = pages.axes_or_new(ax, pages.PAGE)
+    several = envelope.shape[1] > 1
+    bounds = np.ravel(found.error)
+    # the legend lists what was drawn last first
+    for number in reversed(range(envelope.shape[1])):
+        name = f"response {number}" if several else "envelope"
+        style = pages.curve_style(number)
+        curve = np.maximum(levels[:, number], heights[0] - (heights[1] - heights[0]))
+        if bounds[number] > 0:
+            colour = style["color"] if several else pages.GREY
+            label = "_bound" if several and number else "error at most"
+            ax.axhline(float(decibels(bounds[number])), color=colour, linewidth=0.9, linestyle=":", label=label)
+        ax.plot(found.delay / scale, curve, label=name, **style)
+    ax.set_xlim(low / scale, high / scale)
+    ax.set_ylim(*heights)
+    what = "length of the path" if found.unit == "L" else "delay"
+    title = f"resolution {found.resolution / scale:.3g} {unit}, repeats after {found.period / scale:.4g} {unit}"
+    pages.dressed(ax, f"{what} ({unit})", "envelope (dB)")
+    return pages.finished(ax, fresh, title, legend)
+
+
+def plot_profile(
+    found: "RangeProfile",
+    ax: Any = None,
+    *,
+    start: float | None = None,
+    end: float | None = None,
+    span: float = SPAN,
+    unit: str = "L",
+    legend: bool | None = None,
+) -> Any:
+    """Draw 20 log10 of the size of a range profile against the range; ``start`` and ``end`` are ranges.
+
+    Parameters are as of `plot_impulse`, and ``unit``, that of lengths.
+    """
+    low, high = _ends(found.range, start, end)
+    levels = decibels(found.values)
+    heights = shown_range([levels[(found.range >= low) & (found.range <= high)]], span)
+    fresh, ax = pages.axes_or_new(ax, pages.PAGE)
+    floor = heights[0] - (heights[1] - heights[0])
+    ax.plot(found.range, np.maximum(levels, floor), label="profile", **pages.curve_style(0))
+    ax.set_xlim(low, high)
+    ax.set_ylim(*heights)
+    pages.dressed(ax, f"range along the line of sight ({unit})", f"20 log$_{{10}}$|h| (dB re 1 {unit})")
+    pages.finished(ax, fresh, f"resolution {found.resolution:.3g} {unit}", legend=False)
+    # one curve has a legend only where it is asked for, and inside
+    pages.add_legend(ax, False, legend)
+    return ax
+
+
+def _ends(values: FloatArray, start: float | None, end: float | None) -> tuple[float, float]:
+    """First and last value drawn."""
+    low = float(values[0]) if start is None else float(start)
+    high = float(values[-1]) if end is None else float(end)
+    # written so that NaN fails
+    if not (low < high and np.any((values >= low) & (values <= high))):
+        raise InvalidInputError(
+            f"nothing lies between start = {low:g} and end = {high:g}; "
+            f"values reach from {values[0]:g} to {values[-1]:g}"
+        )
+    return low, high

@@ -16,29 +16,22 @@ import numpy as np
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.field.comparison import cross_section_decibels, decibels, shown_range
+from creeping.plotting import pages
 from creeping.plotting._cut_angles import CutAngles, cut_angles
-from creeping.plotting.palette import COLOURS, EXACT, GREY, curve_style
-from creeping.plotting.pictures import add_legend, axes_or_new, new_figure, save_figure, wave_title
 
 if TYPE_CHECKING:
     from creeping.field.far_result import FarField
 
-ABOVE, NARROW = 10.0, 10.0
-"""Room for bands over the curves, dB, and range up to which an axis ends at whole decibels rather than fives."""
-KINDS = ("cartesian", "polar")
+ABOVE = 10.0
+"""Room for bands over the curves, dB."""
 QUANTITIES = {
     "amplitude": ("20 log$_{10}$|f| (dB re 1 %s)", decibels),
     "rcs": ("4π|f|$^2$ (dB re 1 %s$^2$)", cross_section_decibels),
 }
 COMPONENTS = {"tt": (0, 0), "tp": (0, 1), "pt": (1, 0), "pp": (1, 1)}
 """Scattered by incident component of a vector field: t is θ̂, p is φ̂."""
-_GREEK, _RADAR = str.maketrans("tp", "θφ"), str.maketrans("tp", "VH")
 PARTS = {"creeping": "--", "reflected": "-.", "forward": ":", "dark": "--", "lit": "-."}
 """Line of each part of a far field."""
-HATCHED: dict[str, Any] = {"facecolor": "none", "edgecolor": "#b4b9bd", "hatch": "////", "linewidth": 0, "zorder": 0.2}
-"""Of angles at which a field is unresolved."""
-
-PAGE = (6.4, 4.2)  # inches
 
 
 @dataclass(frozen=True)
@@ -122,19 +115,23 @@ def far_cut_picture(
     CreepingError
         If the file cannot be written.
     """
-    if kind not in KINDS:
-        raise InvalidInputError(f"kind {kind!r} is unknown; give {' or '.join(KINDS)}")
+    if kind not in ("cartesian", "polar"):
+        raise InvalidInputError(f"kind {kind!r} is unknown; give cartesian or polar")
     angle = checked_angles(angles)
     curves = cut_curves(len(angle), fields, quantity=quantity, exact=exact, parts=parts, components=components)
     heights = heights_of(curves, span)
-    figure = new_figure((6.4, 4.2) if kind == "cartesian" else (6.4, 6.4))
-    figure.set_layout_engine("constrained")
-    ax = figure.add_subplot(projection="polar" if kind == "polar" else None)
-    level = level_name(quantity, unit or _unit(fields), [getattr(one, "total", one) for one in fields.values()])
-    draw_cut(ax, angle, curves, heights, level=level, angle_name=angle_name)
-    ax.set_title(_title(fields) if title is None else title, fontsize=9)
-    add_legend(ax, fresh=True)
-    save_figure(figure, path, dpi)
+    units = {getattr(field, "unit", "L") for field in fields.values()}
+    shared = units.pop() if len(units) == 1 else "L"
+    level = level_name(quantity, unit or shared, [getattr(one, "total", one) for one in fields.values()])
+    if title is None:
+        whole = [one for one in fields.values() if hasattr(one, "total")]
+        known = {f"{pages.wave_title(one, getattr(one, 'unit', 'L'))} boundary" for one in whole}
+        title = known.pop() if len(known) == 1 else ""
+    with pages.written_figure(path, pages.PAGE if kind == "cartesian" else (6.4, 6.4), dpi) as figure:
+        ax = figure.add_subplot(projection="polar" if kind == "polar" else None)
+        draw_cut(ax, angle, curves, heights, level=level, angle_name=angle_name)
+        ax.set_title(title, fontsize=9)
+        pages.add_legend(ax, fresh=True)
 
 
 def heights_of(curves: Sequence[Curve], span: float) -> tuple[float, float]:
@@ -151,7 +148,8 @@ def heights_of(curves: Sequence[Curve], span: float) -> tuple[float, float]:
         ends += [np.maximum(np.quantile(below, [0.05]), top - span)] if len(below) else []
         ends += [np.minimum(np.quantile(above, [0.95]), top + ABOVE)] if len(above) else []
     low, high = shown_range([*levels, *ends], span + ABOVE)
-    if high - low <= NARROW:
+    # a narrow axis ends at whole decibels rather than fives
+    if high - low <= 10.0:
         low, high = shown_range([*levels, *ends], span + ABOVE, step=1.0)
     return max(low, top - span), high
 
@@ -180,10 +178,8 @@ def draw_cut(
     if ax.lines:
         low, high = min(low, ax.get_ylim()[0]), max(high, ax.get_ylim()[1])
     polar = ax.name == "polar"
-    if polar:
-        _round_axes(ax, (low, high), level, angle_name)
-    else:
-        _straight_axes(ax, angle, (low, high), level, angle_name)
+    dress = _round_axes if polar else _straight_axes
+    dress(ax, angle, (low, high), level, angle_name)
     name = band_words(curves, low, high)
     for curve in reversed(curves):
         # lines that leave the axes through the floor are cut there; round a circle they would pass the centre
@@ -208,10 +204,11 @@ def _hatch(ax: Any, angle: FloatArray, curves: Sequence[Curve]) -> None:
     middles = 0.5 * (across[1:] + across[:-1])
     starts, ends = np.append(across[:1], middles), np.append(middles, across[-1:])
     edges = np.flatnonzero(np.diff(np.concatenate([[0], doubtful.astype(int), [0]])))
+    look: dict[str, Any] = {"facecolor": "none", "edgecolor": "#b4b9bd", "hatch": "////", "linewidth": 0, "zorder": 0.2}
     label = "unresolved"
     for first, after in edges.reshape(-1, 2):
         span = sorted((starts[first], ends[after - 1]))
-        ax.axvspan(*span, label=label, **HATCHED)
+        ax.axvspan(*span, label=label, **look)
         label = "_one entry is enough"
 
 
@@ -244,14 +241,14 @@ def cut_curves(
     for label, field in fields.items():
         whole = field if isinstance(field, np.ndarray) else getattr(field, "total", field)
         for suffix, pick in _picks(label, whole, count, components):
-            style = curve_style(len(thick))
+            style = pages.curve_style(len(thick))
             colour = style["color"]
             doubt = getattr(field, "unresolved", None)
             levels, band = _levels(pick(whole), quantity), _band(field, pick, quantity)
             thick.append(Curve(label + suffix, levels, style, band, doubt))
             for number, (part, values) in enumerate(getattr(field, "parts", {}).items() if parts else ()):
                 # of one curve alone the parts have colours of their own, of several that of their curve
-                own = COLOURS[1 + number] if len(fields) == 1 and not suffix else colour
+                own = pages.COLOURS[1 + number] if len(fields) == 1 and not suffix else colour
                 style = {"color": own, "linewidth": 0.7, "linestyle": PARTS[part]}
                 levels = _levels(pick(values), quantity)
                 # a part that is nowhere has no line
@@ -260,7 +257,7 @@ def cut_curves(
     if exact is not None:
         for suffix, pick in _picks("exact", exact, count, components):
             # broad and pale, so that a curve that lies on it hides it not
-            style = {"color": EXACT, "linewidth": 3.2, "alpha": 0.3}
+            style = {"color": pages.EXACT, "linewidth": 3.2, "alpha": 0.3}
             thin.append(Curve(f"exact{suffix}", _levels(pick(exact), quantity), style))
     return thick + thin
 
@@ -306,7 +303,8 @@ def component_name(name: str) -> str:
     >>> component_name("tt"), component_name("pt")
     ('θθ (VV)', 'φθ (HV)')
     """
-    return name.translate(_GREEK) + f" ({name.translate(_RADAR)})"
+    greek, radar = (name.translate(str.maketrans("tp", letters)) for letters in ("θφ", "VH"))
+    return f"{greek} ({radar})"
 
 
 def _levels(values: ComplexArray, quantity: str) -> FloatArray:
@@ -324,18 +322,18 @@ def _straight_axes(ax: Any, angle: FloatArray, heights: tuple[float, float], lab
     ax.set_ylim(*heights)
     # multiples of 15, 30, 45, ... degrees
     ax.xaxis.set_major_locator(MaxNLocator(9, steps=[1, 1.5, 2, 3, 4.5, 6, 9, 10]))
-    dressed(ax, f"{angle_name} (degrees)", label)
+    pages.dressed(ax, f"{angle_name} (degrees)", label)
     for spine in ax.spines.values():
         spine.set_linewidth(0.5)
 
 
-def _round_axes(ax: Any, heights: tuple[float, float], label: str, angle_name: str) -> None:
+def _round_axes(ax: Any, _: FloatArray, heights: tuple[float, float], label: str, angle_name: str) -> None:
     from matplotlib.patheffects import withStroke
 
     ax.set_theta_zero_location("N")
     ax.set_theta_direction(-1)
     signed = [v if v <= 180 else v - 360 for v in range(0, 360, 30)]
-    ax.set_thetagrids(range(0, 360, 30), labels=[f"{minus(v)}°" for v in signed])
+    ax.set_thetagrids(range(0, 360, 30), labels=[f"{pages.minus(v)}°" for v in signed])
     low, high = heights
     step = next(s for s in (5, 10, 20, 50, 100, 1000) if (high - low) / s <= 6)
     rings = np.arange(step * np.ceil(low / step + 1e-9), high + 1e-9, step)
@@ -347,41 +345,11 @@ def _round_axes(ax: Any, heights: tuple[float, float], label: str, angle_name: s
     halo = [withStroke(linewidth=2.0, foreground="white")]
     look: dict[str, Any] = {"fontsize": 7, "color": "#5a6872", "ha": "center", "va": "center", "gid": "ring"}
     for ring in rings:
-        ax.text(np.radians(165), ring, minus(ring), path_effects=halo, zorder=4, **look)
+        ax.text(np.radians(165), ring, pages.minus(ring), path_effects=halo, zorder=4, **look)
     ax.tick_params(axis="x", labelsize=8)
     ax.grid(color="#d9dde0", linewidth=0.5)
     ax.spines["polar"].set_linewidth(0.5)
     ax.set_xlabel(f"{angle_name}; rings: {label}", fontsize=9)
-
-
-def dressed(ax: Any, across: str, up: str, title: str | None = None) -> None:
-    """Give straight axes their names, grid and ticks, and a title."""
-    ax.set_xlabel(across, fontsize=9)
-    ax.set_ylabel(up, fontsize=9)
-    if title is not None:
-        ax.set_title(title, fontsize=9, parse_math=False)
-    ax.grid(color="#d9dde0", linewidth=0.5)
-    ax.tick_params(labelsize=8, direction="in", top=True, right=True, width=0.5)
-
-
-def minus(value: float) -> str:
-    """A number with a minus sign in place of a hyphen, as the numbers of straight axes have it."""
-    return f"{value:g}".replace("-", "\N{MINUS SIGN}")
-
-
-def _unit(fields: Mapping[str, Any]) -> str:
-    """Unit of lengths that all fields share."""
-    units = {getattr(field, "unit", "L") for field in fields.values()}
-    return units.pop() if len(units) == 1 else "L"
-
-
-def _title(fields: Mapping[str, Any]) -> str:
-    known = {
-        f"{wave_title(field, getattr(field, 'unit', 'L'))} boundary"
-        for field in fields.values()
-        if hasattr(field, "total")
-    }
-    return known.pop() if len(known) == 1 else ""
 
 
 def plot_far(
@@ -440,22 +408,16 @@ def plot_far(
         cut = CutAngles(given, angle_name, np.arange(len(given)))
     curves = cut_curves(len(cut.values), {"total": far}, quantity=quantity, parts=parts, components=components)
     heights = heights_of(curves, span)
-    curves = [curve.ordered(cut.order, _short(curve.label)) for curve in curves]
-    fresh, ax = axes_or_new(ax, PAGE)
+    # where something else tells, the name of the whole is left out
+    labels = [curve.label.removeprefix("total").lstrip(", ") or curve.label for curve in curves]
+    curves = [curve.ordered(cut.order, label) for curve, label in zip(curves, labels, strict=True)]
+    fresh, ax = pages.axes_or_new(ax, pages.PAGE)
     unit = unit or far.unit
     draw_cut(
         ax, cut.values[cut.order], curves, heights, level=level_name(quantity, unit, [far.total]), angle_name=cut.name
     )
     _mark(ax, cut.values[cut.order], curves, heights[1])
-    if fresh:
-        ax.set_title(f"{wave_title(far, unit)} boundary", fontsize=9, parse_math=False)
-    add_legend(ax, fresh, legend)
-    return ax
-
-
-def _short(label: str) -> str:
-    """Label without the name of the whole, where something else tells: "total" alone stays."""
-    return label.removeprefix("total").lstrip(", ") or label
+    return pages.finished(ax, fresh, f"{pages.wave_title(far, unit)} boundary", legend)
 
 
 def _mark(ax: Any, angle: FloatArray, curves: Sequence[Curve], high: float) -> None:
@@ -465,4 +427,4 @@ def _mark(ax: Any, angle: FloatArray, curves: Sequence[Curve], high: float) -> N
     gone = np.any([np.isnan(curve.levels) for curve in curves if curve.thick], axis=0)
     if np.any(gone):
         height = np.full(int(gone.sum()), high)
-        ax.plot(x[gone], height, marker="x", color=GREY, label="not finite", clip_on=False, **look)
+        ax.plot(x[gone], height, marker="x", color=pages.GREY, label="not finite", clip_on=False, **look)

@@ -21,10 +21,9 @@ from creeping.field.surface import scalar_boundary
 from creeping.geometry.checks import unit_of
 from creeping.plotting._drawing import View, caption, compose
 from creeping.plotting._strokes import chosen_rays
-from creeping.plotting.coloured_body import NOTHING, cells_of, save_painted
-from creeping.plotting.coupling_pictures import with_fronts
-from creeping.plotting.palette import curve_style
-from creeping.plotting.pictures import chosen_backend, new_figure, save_figure
+from creeping.plotting.coloured_body import NOTHING, cells_of, save_painted, with_fronts
+from creeping.plotting.pages import PAGE, curve_style, dressed, written_figure
+from creeping.plotting.pictures import chosen_backend
 from creeping.rays.fan import RayFan
 
 CAUSTIC: dict[str, Any] = {"linewidth": 0.7, "linestyle": (0, (4, 3))}
@@ -104,16 +103,6 @@ def surface_field_picture(
     return save_painted(path, drawing, levels, span=span, label=label, bare="no ray passes", backend=backend, dpi=dpi)
 
 
-def surface_levels(
-    fan: RayFan, points: FloatArray, *, wavenumber: float, boundary: BoundaryLike = "soft", order: int = 2
-) -> FloatArray:
-    """20 log10 of the field's magnitude at points of the body, lit or in the shadow: (n, 3) -> (n,).
-
-    |u|, or |du/dn|/k of the soft boundary; NaN in the shadow where no ray passes, inf on a caustic.
-    """
-    return levels_of(surface_values(fan, points, wavenumber=wavenumber, boundary=boundary, order=order))
-
-
 def surface_values(
     fan: RayFan, points: FloatArray, *, wavenumber: float, boundary: BoundaryLike = "soft", order: int = 2
 ) -> ComplexArray:
@@ -168,6 +157,8 @@ def decay_picture(
     CreepingError
         If the file cannot be written.
     """
+    from matplotlib.lines import Line2D
+
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, order)
     picked = chosen_rays(fan, rays)
@@ -176,28 +167,21 @@ def decay_picture(
     field = surface_field(fan, wavenumber=k, boundary=boundary, order=order)[picked]
     levels = decibels(field / k if kind.kind == "soft" else field)
     levels[~np.isfinite(levels)] = np.nan
-    figure = new_figure((6.4, 4.2))
-    figure.set_layout_engine("constrained")
-    ax = figure.add_subplot()
     # beside a caustic a step of a ray may lie at any height: the range follows the starts
     starts = levels[:, : max(2, levels.shape[1] // 8)]
     low, high = shown_range([np.clip(levels, -np.inf, np.nanmax(starts) + 10.0)], span)
-    for number, (ray, level) in enumerate(zip(picked, levels, strict=True)):
-        _draw_decay(ax, fan, ray, level, curve_style(number, 1.2))
-    ax.set_xlim(0.0, float(fan.travel_time[-1]))
-    ax.set_ylim(low, high)
-    ax.set_xlabel(f"arclength from the shadow line ({unit_of(fan.body)})", fontsize=9)
-    ax.set_ylabel(_name(kind), fontsize=9)
-    ax.set_title(f"Field of single rays, k = {k:g}/{unit_of(fan.body)}, {_boundary_name(kind)} boundary", fontsize=9)
-    ax.grid(color="#d9dde0", linewidth=0.5)
-    ax.tick_params(labelsize=8, direction="in", top=True, right=True, width=0.5)
-    handles = ax.get_legend_handles_labels()[0]
-    if np.any(fan.caustic_index[picked]):
-        from matplotlib.lines import Line2D
-
-        handles.append(Line2D([], [], color=NOTHING, label="caustic", **CAUSTIC))
-    figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
-    save_figure(figure, path, dpi)
+    with written_figure(path, PAGE, dpi) as figure:
+        ax = figure.add_subplot()
+        for number, (ray, level) in enumerate(zip(picked, levels, strict=True)):
+            _draw_decay(ax, fan, ray, level, curve_style(number, 1.2))
+        ax.set_xlim(0.0, float(fan.travel_time[-1]))
+        ax.set_ylim(low, high)
+        title = f"Field of single rays, k = {k:g}/{unit_of(fan.body)}, {_boundary_name(kind)} boundary"
+        dressed(ax, f"arclength from the shadow line ({unit_of(fan.body)})", _name(kind), title)
+        handles = ax.get_legend_handles_labels()[0]
+        if np.any(fan.caustic_index[picked]):
+            handles.append(Line2D([], [], color=NOTHING, label="caustic", **CAUSTIC))
+        figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
 
 
 def _draw_decay(ax: Any, fan: RayFan, ray: int, level: FloatArray, style: dict[str, Any]) -> None:

@@ -1,31 +1,29 @@
-"""Pictures that shadow lines, fans and iso-phase curves draw of themselves, in the plane of parameters or in space.
+"""Pictures of shadow lines, fans and iso-phase curves in the plane of parameters or in space, and errors of phase maps.
 
-Also here: the error of a phase map against the length of the ray.
+The plane is that of the body's parameters in degrees: (theta, phi), or (theta, psi) on a torus.
 """
 
+import os
 from collections.abc import Sequence
+from typing import Unpack
 
 import numpy as np
 
 from creeping._presenting import brief
-from creeping._typing import Any
+from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.boundary import BoundaryLike
 from creeping.geometry.checks import unit_of
 from creeping.geometry.incident import incident_of_row
 from creeping.phaseflow.phase_map import PhaseMap
+from creeping.plotting import _strokes, pages
 from creeping.plotting._drawing import Drawing, View, compose, rays_caption
-from creeping.plotting._strokes import LEVEL_NAMES
-from creeping.plotting.far_cuts import PAGE
-from creeping.plotting.palette import COLOURS, GREY, curve_style
-from creeping.plotting.parameter_plane import draw_curves, frame, is_torus, page_size, plot_parameters
-from creeping.plotting.pictures import TITLE_SIZE, add_legend, axes_or_new, drawn_page
+from creeping.plotting._strokes import LevelColours, RayLook, RayOptions
+from creeping.plotting.pictures import TITLE_SIZE, drawn_page
 from creeping.rays.fan import RayFan
-from creeping.rays.isophase import IsoPhaseCurve
+from creeping.rays.isophase import IsoPhaseCurve, split_at_seam
 from creeping.shadow.curve import ShadowCurve
 from creeping.shadow.line import ShadowLine
-
-KINDS = ("parameters", "3d")
+from creeping.shadow.status import STATUSES
 
 
 def line_of(curve: ShadowCurve) -> ShadowLine:
@@ -40,12 +38,9 @@ def plot_line(
     kind: str | None = None,
     fan: RayFan | None = None,
     curves: Sequence[IsoPhaseCurve] = (),
-    rays: int = 48,
-    until: float | None = None,
-    wavenumber: float | None = None,
-    boundary: BoundaryLike = "hard",
     view: View | None = None,
     legend: bool | None = None,
+    **shown: Unpack[RayOptions],
 ) -> Any:
     """Draw a shadow line, by default in the plane of the body's parameters, in degrees.
 
@@ -81,7 +76,6 @@ def plot_line(
     InvalidInputError
         If the kind is unknown or not that of the axes, or a view is given for the plane.
     """
-    shown: dict[str, Any] = {"rays": rays, "until": until, "wavenumber": wavenumber, "boundary": boundary}
     if _in_space(ax, kind):
         if ax is None:
             return _page(compose(line, fan, curves, view=view, **shown), legend is not False)
@@ -90,22 +84,12 @@ def plot_line(
         return plot_rays_3d(line, fan, curves, ax=ax, view=view, legend=bool(legend), **shown)
     if view is not None:
         raise InvalidInputError("a view is for kind='3d'; the plane of the parameters has none")
-    fresh, ax = axes_or_new(ax, page_size(torus=is_torus(line)))
+    fresh, ax = pages.axes_or_new(ax, page_size(torus=is_torus(line)))
     ax = plot_parameters(line, fan, curves, ax=ax, legend=fresh if legend is None else legend, **shown)
     if fresh:
-        title = rays_caption(line, fan, until, wavenumber, boundary)
+        title = rays_caption(line, fan, RayLook(**shown))
         ax.set_title(title, fontsize=TITLE_SIZE, loc="left", parse_math=False)
     return ax
-
-
-def plot_shadow_curve(curve: ShadowCurve, ax: Any = None, **options: Any) -> Any:
-    """Draw one curve of a shadow line; options as for `plot_line`."""
-    return plot_line(line_of(curve), ax, **options)
-
-
-def plot_fan(fan: RayFan, ax: Any = None, **options: Any) -> Any:
-    """Draw a fan and its shadow line; options as for `plot_line`."""
-    return plot_line(fan.line, ax, fan=fan, **options)
 
 
 def plot_curve(curve: IsoPhaseCurve, ax: Any = None, *, kind: str | None = None, legend: bool | None = None) -> Any:
@@ -134,11 +118,11 @@ def plot_curve(curve: IsoPhaseCurve, ax: Any = None, *, kind: str | None = None,
     # the body is not known here: a polar angle is never negative, that of a torus takes both signs
     torus = bool(np.any(curve.parameters[:, 0] < 0))
     page = (6.4, 4.4) if space else page_size(torus=torus)
-    fresh, ax = axes_or_new(ax, page, space=space)
+    fresh, ax = pages.axes_or_new(ax, page, space=space)
     if space:
         points = np.concatenate([curve.points, curve.points[: int(curve.closed)]])
         # above the body of a picture, which orders what it draws by hand
-        name = LEVEL_NAMES.get(curve.of, curve.of)
+        name = _strokes.LEVEL_NAMES.get(curve.of, curve.of)
         ax.plot(*points.T, linewidth=1.0, zorder=13, label=f"{name} = {curve.level:g}")
         if fresh:
             ax.set(xlabel="x (L)", ylabel="y (L)", zlabel="z (L)", aspect="equal")
@@ -147,7 +131,7 @@ def plot_curve(curve: IsoPhaseCurve, ax: Any = None, *, kind: str | None = None,
         draw_curves(ax, [curve])
         if not framed:
             frame(ax, torus=torus)
-    add_legend(ax, fresh, legend)
+    pages.add_legend(ax, fresh, legend)
     return ax
 
 
@@ -176,33 +160,27 @@ def plot_growth(flow: PhaseMap, ax: Any = None, *, tolerance: float | None = Non
     growth, error = flow.growth, flow.error
     if growth is None and not error.samples:
         raise InvalidInputError("the error of this map has not been measured; build_phase_map does")
-    fresh, ax = axes_or_new(ax, PAGE)
+    fresh, ax = pages.axes_or_new(ax, pages.PAGE)
     lengths = (flow.horizon,) if growth is None else growth.lengths
     rms, largest = ((error.rms,), (error.max,)) if growth is None else (growth.rms, growth.max)
     for number, name, values in ((1, "max", largest), (0, "rms", rms)):
-        ax.plot(lengths, values, marker="os"[number], markersize=4, label=name, **curve_style(number))
+        ax.plot(lengths, values, marker="os"[number], markersize=4, label=name, **pages.curve_style(number))
     if growth is not None:
-        ax.plot(lengths[-1:], [growth.bound], "_", color=COLOURS[0], markersize=12, label="bound of the rms")
+        ax.plot(lengths[-1:], [growth.bound], "_", color=pages.COLOURS[0], markersize=12, label="bound of the rms")
     tolerance = flow.parameters.get("tolerance") if tolerance is None else tolerance
     if tolerance is not None:
-        ax.axhline(tolerance, color=GREY, linewidth=0.9, linestyle=":", label=f"tolerance {tolerance:.3g}")
+        ax.axhline(tolerance, color=pages.GREY, linewidth=0.9, linestyle=":", label=f"tolerance {tolerance:.3g}")
     ax.set_yscale("log")
     weighted = getattr(flow.body, "speed", None) is not None
-    ax.set_xlabel("travel time of the ray" if weighted else f"length of the ray ({unit_of(flow.body)})", fontsize=9)
-    ax.set_ylabel("error of (x, p)", fontsize=9)
-    ax.grid(color="#d9dde0", linewidth=0.5)
-    ax.tick_params(labelsize=8, direction="in", top=True, right=True, width=0.5, which="both")
-    if fresh:
-        # a body may be an expression of the user's and is no formula
-        ax.set_title(f"{brief(flow.body)}, T0 = {flow.horizon:g}", fontsize=9, parse_math=False)
-    add_legend(ax, fresh, legend)
-    return ax
+    across = "travel time of the ray" if weighted else f"length of the ray ({unit_of(flow.body)})"
+    pages.dressed(ax, across, "error of (x, p)")
+    return pages.finished(ax, fresh, f"{brief(flow.body)}, T0 = {flow.horizon:g}", legend)
 
 
 def _in_space(ax: Any, kind: str | None) -> bool:
     """Whether to draw in space."""
-    if kind is not None and kind not in KINDS:
-        raise InvalidInputError(f"kind {kind!r} is unknown; give {' or '.join(KINDS)}")
+    if kind is not None and kind not in ("parameters", "3d"):
+        raise InvalidInputError(f"kind {kind!r} is unknown; give parameters or 3d")
     space = kind == "3d"
     if ax is None:
         return space
@@ -220,3 +198,161 @@ def _page(drawing: Drawing, legend: bool) -> Any:
         if drawing.colours.high > drawing.colours.low:
             drawing.colours.add_bar(figure, cax=figure.add_axes(bar))
     return figure.axes[0]
+
+
+def parameter_picture(
+    path: str | os.PathLike[str],
+    line: ShadowLine,
+    fan: RayFan | None = None,
+    curves: Sequence[IsoPhaseCurve] = (),
+    *,
+    name: str = "",
+    dpi: int = 300,
+    **shown: Unpack[RayOptions],
+) -> None:
+    """Write a PNG of the same in the plane of the body's parameters; see `plot_parameters`.
+
+    Raises
+    ------
+    CreepingError
+        If the file cannot be written.
+    """
+    with pages.written_figure(path, page_size(torus=is_torus(line)), dpi) as figure:
+        ax = plot_parameters(line, fan, curves, ax=figure.add_subplot(), **shown)
+        title = rays_caption(line, fan, RayLook(**shown), name)
+        ax.set_title(title, fontsize=TITLE_SIZE, loc="left", parse_math=False)
+
+
+def plot_parameters(
+    line: ShadowLine,
+    fan: RayFan | None = None,
+    curves: Sequence[IsoPhaseCurve] = (),
+    *,
+    ax: Any = None,
+    legend: bool = True,
+    **shown: Unpack[RayOptions],
+) -> Any:
+    """Draw the shadow line, creeping rays and iso-phase curves over (phi, theta) in degrees.
+
+    Parameters
+    ----------
+    line : ShadowLine
+    fan : RayFan, optional
+    curves : sequence of IsoPhaseCurve
+    ax : matplotlib.axes.Axes, optional
+        Axes to draw on; by default those of a new figure.
+    rays : int
+        Rays drawn at most.
+    until : float, optional
+        Travel time up to which rays are drawn; by default until their waves have fallen by 30 dB, or they have crossed
+        their neighbours twice.
+    wavenumber : float, optional, 1/L
+        Of these waves; that at which k rho = 10 if not given.
+    boundary : "hard", "soft", "pec" or ImpedanceBoundary
+        Of these waves; on a hard body they fall most slowly.
+    legend : bool
+        Whether to add a legend and the colour bar of the levels.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    if ax is None:
+        from matplotlib import pyplot
+
+        ax = pyplot.figure(figsize=page_size(torus=is_torus(line)), dpi=150, layout="constrained").add_subplot()
+    look = RayLook(**shown)
+    body, ends = line.body, _strokes.drawn_ends(fan, look.until, look.wavenumber, look.boundary)
+    if fan is not None:
+        # finer than in space: near a pole phi turns fast
+        for stroke in _strokes.ray_strokes(fan, look.rays, ends, spacing=0.005):
+            pieces = _in_plane(body, stroke.lines)
+            _add(ax, pieces, color=stroke.colour, linewidth=0.8 * stroke.width, alpha=stroke.alpha, label=stroke.label)
+    colours = draw_curves(ax, _strokes.drawn_curves(curves, fan, ends), fan, ends)
+    for status in STATUSES:
+        pieces = _in_plane(body, _strokes.line_pieces(line, status))
+        _add(ax, pieces, color=_strokes.STATUS_COLOURS[status], linewidth=1.8, label=f"shadow line, {status}", zorder=4)
+    frame(ax, torus=is_torus(line))
+    if legend:
+        _add_legend(ax, colours)
+    return ax
+
+
+def page_size(*, torus: bool) -> tuple[float, float]:
+    """Width and height, inches, of a page that the plane fills, with a legend below and a bar beside it."""
+    return (6.4, 5.9) if torus else (6.4, 3.6)
+
+
+def draw_curves(
+    ax: Any, curves: Sequence[IsoPhaseCurve], fan: RayFan | None = None, ends: FloatArray | None = None
+) -> LevelColours:
+    """Draw iso-phase curves, faint where rays of their fan have detached, and return the colours of their levels.
+
+    ``ends`` are those of `creeping.plotting._strokes.drawn_ends`, none by default.
+    """
+    colours = LevelColours.of(curves)
+    for curve in curves:
+        # levels are read off the colour bar; a single one has none
+        label = "" if colours.high > colours.low or curve is not curves[0] else colours.words(curve.level)
+        bound, free = (
+            [piece for part in parts for piece in split_at_seam(part, closed=False)]
+            for parts in _strokes.curve_pieces(curve, fan, curve.parameters, ends)
+        )
+        colour = colours(curve.level)
+        _add(ax, bound, color=colour, linewidth=1.0, label=label, zorder=3)
+        _add(ax, free, color=colour, linewidth=_strokes.FADED_WIDTH, alpha=_strokes.FADED, zorder=3)
+    return colours
+
+
+def _in_plane(body: Any, lines: Sequence[FloatArray]) -> list[FloatArray]:
+    """Lines on the body (n, 3) as pieces of curves of its parameters (k, 2)."""
+    return [piece for points in lines for piece in split_at_seam(body.parameters(points), closed=False)]
+
+
+def is_torus(line: ShadowLine) -> bool:
+    """Whether theta runs all the way round, as on a torus, rather than from pole to pole.
+
+    A polar angle is never negative, while the shadow line of a torus, n.d = 0, meets both signs of theta.
+    """
+    return any(float(np.min(line.body.parameters(curve.points)[..., 0])) < 0 for curve in line.curves)
+
+
+def _add(ax: Any, pieces: Sequence[FloatArray], *, label: str = "", **style: Any) -> None:
+    """Add the pieces (k, 2) as one artist, phi to the right and theta upwards or downwards."""
+    from matplotlib.collections import LineCollection
+
+    if pieces:
+        lines = [np.degrees(piece[:, ::-1]) for piece in pieces]
+        ax.add_collection(LineCollection(lines, label=label or "_hidden", capstyle="round", **style))
+
+
+def frame(ax: Any, *, torus: bool) -> None:
+    """Axes of the plane: (phi, theta), or (psi, theta) all the way round on a torus, in degrees."""
+    name = "psi" if torus else "phi"
+    ax.set_xlim(-180, 180)
+    ax.set_xticks(range(-180, 181, 60))
+    # a polar angle grows from the upper pole down, like the picture of the body
+    ax.set_ylim(*((-180, 180) if torus else (180, 0)))
+    ax.set_yticks(range(-180, 181, 60) if torus else range(0, 181, 30))
+    ax.set_xlabel(rf"$\{name}$ (degrees)", fontsize=9)
+    ax.set_ylabel(r"$\theta$ (degrees)", fontsize=9)
+    ax.set_aspect("equal")
+    ax.tick_params(labelsize=8, direction="in", top=True, right=True, width=0.5)
+    for spine in ax.spines.values():
+        spine.set_linewidth(0.5)
+
+
+def _add_legend(ax: Any, colours: LevelColours) -> None:
+    handles, labels = ax.get_legend_handles_labels()
+    order = sorted(range(len(labels)), key=lambda k: not labels[k].startswith("shadow"))
+    ax.figure.legend(
+        [handles[k] for k in order],
+        [labels[k] for k in order],
+        loc="outside lower center" if ax.figure.get_layout_engine() is not None else "lower center",
+        ncols=min(3, max(1, len(labels))),
+        frameon=False,
+        fontsize=8,
+    )
+    # without levels to tell apart there is no bar, and no place for one
+    if colours.high > colours.low:
+        colours.add_bar(ax.figure, cax=ax.inset_axes((1.03, 0.0, 0.025, 1.0)))

@@ -8,7 +8,7 @@ import numpy as np
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.plotting._drawing import View
 from creeping.plotting.axes3d import brightness
-from creeping.plotting.pictures import new_figure, save_figure
+from creeping.plotting.pages import add_bar, new_figure, save_figure
 
 VIEWS = (View(np.radians(-60.0), np.radians(25.0)), View(np.radians(120.0), np.radians(-25.0)))
 HIGHEST, SPAN = 0.0, (3.0, 6.0)
@@ -102,11 +102,7 @@ def _draw(figure: Any, bottom: float, height: float, mesh: MeshValues, label: st
     figure.text(0.02, bottom + 0.94 * height, mesh.title, fontsize=9, va="center")
     colour = BAD_COLOUR if mesh.bad.any() else "black"
     figure.text(0.86, bottom + 0.94 * height, rough, fontsize=8, va="center", ha="right", color=colour)
-    bar = figure.colorbar(
-        colours, cax=figure.add_axes((0.885, bottom + 0.1 * height, 0.018, 0.76 * height)), extend="min"
-    )
-    bar.set_label(label, fontsize=7)
+    place = figure.add_axes((0.885, bottom + 0.1 * height, 0.018, 0.76 * height))
+    bar = add_bar(figure, colours, label, fontsize=7, extend="min", cax=place)
     ticks = np.arange(lowest, HIGHEST + 1)
     bar.set_ticks(ticks, labels=[f"$10^{{{int(t)}}}$" for t in ticks])
-    bar.ax.tick_params(labelsize=8, width=0.5)
-    bar.outline.set_linewidth(0.5)

@@ -2,24 +2,24 @@
 
 import os
 from collections.abc import Sequence
+from typing import Unpack
 
 import numpy as np
 
 from creeping._typing import Any
 from creeping.errors import InvalidInputError
-from creeping.field.boundary import BoundaryLike
-from creeping.plotting._drawing import Drawing, View, compose, rays_caption
-from creeping.plotting._strokes import ARROW_COLOUR
-from creeping.plotting.scene import gl_available
+from creeping.plotting import axes3d
+from creeping.plotting._drawing import Drawing, View, compose
+from creeping.plotting._strokes import ARROW_COLOUR, RayOptions
+from creeping.plotting.pages import new_figure, save_figure
+from creeping.plotting.scene import gl_available, render
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowLine
-from creeping.storage.atomic import written_aside
 
-BACKENDS = ("auto", "pyvista", "matplotlib")
 WIDTH = 6.4  # inches
-TITLE, TITLE_SIZE = 0.16, 8.0
-"""Height of a line of the title, inches, and its letters, points."""
+TITLE_SIZE = 8.0
+"""Of the letters of a title, points."""
 FINER = 1.6
 """Pixels of what OpenGL renders for each of the file, along a side."""
 Place = tuple[float, float, float, float]  # left, bottom, width, height, as shares of the figure
@@ -33,12 +33,9 @@ def picture(
     *,
     backend: str = "auto",
     view: View | None = None,
-    rays: int = 48,
-    until: float | None = None,
-    wavenumber: float | None = None,
-    boundary: BoundaryLike = "hard",
     name: str = "",
     dpi: int = 300,
+    **shown: Unpack[RayOptions],
 ) -> str:
     """Write a PNG of the body with its shadow line, creeping rays and iso-phase curves.
 
@@ -80,7 +77,6 @@ def picture(
         If pyvista is asked for and cannot draw here, or the file cannot be written.
     """
     backend = chosen_backend(backend)
-    shown: dict[str, Any] = {"rays": rays, "until": until, "wavenumber": wavenumber, "boundary": boundary}
     drawing = compose(line, fan, curves, view=view, name=name, **shown)
     figure, bar = drawn_page(drawing, backend, dpi)
     drawing.add_legend(figure)
@@ -88,37 +84,6 @@ def picture(
         drawing.colours.add_bar(figure, cax=figure.add_axes(bar))
     save_figure(figure, path, dpi)
     return backend
-
-
-def parameter_picture(
-    path: str | os.PathLike[str],
-    line: ShadowLine,
-    fan: RayFan | None = None,
-    curves: Sequence[IsoPhaseCurve] = (),
-    *,
-    rays: int = 48,
-    until: float | None = None,
-    wavenumber: float | None = None,
-    boundary: BoundaryLike = "hard",
-    name: str = "",
-    dpi: int = 300,
-) -> None:
-    """Write a PNG of the same in the plane of the body's parameters; see `plot_parameters`.
-
-    Raises
-    ------
-    CreepingError
-        If the file cannot be written.
-    """
-    from creeping.plotting.parameter_plane import is_torus, page_size, plot_parameters
-
-    figure = new_figure(page_size(torus=is_torus(line)))
-    figure.set_layout_engine("constrained")
-    shown: dict[str, Any] = {"rays": rays, "until": until, "wavenumber": wavenumber, "boundary": boundary}
-    ax = plot_parameters(line, fan, curves, ax=figure.add_subplot(), **shown)
-    title = rays_caption(line, fan, until, wavenumber, boundary, name)
-    ax.set_title(title, fontsize=TITLE_SIZE, loc="left", parse_math=False)
-    save_figure(figure, path, dpi)
 
 
 def chosen_backend(backend: str) -> str:
@@ -129,8 +94,8 @@ def chosen_backend(backend: str) -> str:
     InvalidInputError
         If the backend is not one of the three.
     """
-    if backend not in BACKENDS:
-        raise InvalidInputError(f"backend {backend!r} is unknown; give one of {', '.join(BACKENDS)}")
+    if backend not in ("auto", "pyvista", "matplotlib"):
+        raise InvalidInputError(f"backend {backend!r} is unknown; give one of auto, pyvista, matplotlib")
     if backend == "auto":
         return "pyvista" if gl_available().ok else "matplotlib"
     return backend
@@ -139,53 +104,15 @@ def chosen_backend(backend: str) -> str:
 def drawn_page(drawing: Drawing, backend: str, dpi: int) -> tuple[Any, Place]:
     """Figure with the body's picture and room for a legend, and the place of a colour bar."""
     figure, place = _page(drawing)
-    draw = _draw_pyvista if backend == "pyvista" else _draw_matplotlib
-    draw(figure, place, drawing, dpi)
+    if backend == "pyvista":
+        _draw_pyvista(figure, place, drawing, dpi)
+    else:
+        from creeping.plotting._inline import InlineAxes3D
+
+        axes3d.draw(figure.add_axes(place, axes_class=InlineAxes3D), drawing)
     figure.text(0.02, 0.99, drawing.title, fontsize=TITLE_SIZE, va="top", parse_math=False)
     left, bottom, width, height = place
     return figure, (left + width + 0.02, bottom + 0.12 * height, 0.022, 0.76 * height)
-
-
-def new_figure(inches: tuple[float, float]) -> Any:
-    """Return a figure outside pyplot: no window, no global state, whatever the user's backend; notebooks show it."""
-    from creeping.plotting._inline import made
-
-    return made(inches)
-
-
-def axes_or_new(ax: Any, inches: tuple[float, float], *, space: bool = False) -> tuple[bool, Any]:
-    """Whether the axes are new, and the axes: those given, or those of a new figure, of the plane or of space."""
-    if ax is not None:
-        return False, ax
-    from creeping.plotting._inline import InlineAxes, InlineAxes3D
-
-    figure = new_figure(inches)
-    figure.set_layout_engine("constrained")
-    return True, figure.add_subplot(axes_class=InlineAxes3D if space else InlineAxes)
-
-
-def add_legend(ax: Any, fresh: bool, legend: bool | None = None) -> None:
-    """Legend below a new figure, or on axes that were given if it is asked for; what was drawn last comes first."""
-    handles, labels = ax.get_legend_handles_labels()
-    if not (fresh if legend is None else legend) or not labels:
-        return
-    look: dict[str, Any] = {"frameon": False, "fontsize": 8}
-    if fresh:
-        columns = min(4 if max(map(len, labels)) < 20 else 3, len(labels))
-        ax.figure.legend(handles[::-1], labels[::-1], loc="outside lower center", ncols=columns, **look)
-    else:
-        ax.legend(handles[::-1], labels[::-1], **look)
-
-
-def wave_title(field: Any, unit: str) -> str:
-    """Wavenumber and boundary of a field, lengths in ``unit``: a title that is no formula, boundaries being users'."""
-    return f"k = {field.wavenumber:g}/{unit}, {field.boundary}"
-
-
-def save_figure(figure: Any, path: str | os.PathLike[str], dpi: int) -> None:
-    """Write the figure as PNG, at once when complete."""
-    with written_aside(path) as aside:
-        figure.savefig(aside, dpi=dpi, format="png")
 
 
 def _page(drawing: Drawing) -> tuple[Any, Place]:
@@ -196,26 +123,17 @@ def _page(drawing: Drawing) -> tuple[Any, Place]:
     body = float(np.clip(width * (high[1] - low[1]) / (high[0] - low[0]), 2.4, 4.6))
     legend = 0.55 if len({stroke.label for stroke in drawing.strokes} - {""}) > 3 else 0.38
     lines = drawing.title.count("\n") + 1 if drawing.title else 0
-    height = body + legend + 0.05 + TITLE * lines
+    height = body + legend + 0.05 + 0.16 * lines
     return new_figure((WIDTH, height)), (0.01, legend / height, width / WIDTH, body / height)
-
-
-def _draw_matplotlib(figure: Any, place: Place, drawing: Drawing, dpi: int) -> None:
-    from creeping.plotting import axes3d
-    from creeping.plotting._inline import InlineAxes3D
-
-    axes3d.draw(figure.add_axes(place, axes_class=InlineAxes3D), drawing)
 
 
 def _draw_pyvista(figure: Any, place: Place, drawing: Drawing, dpi: int) -> None:
     """Render the scene without any text, which matplotlib then sets, sharper and as in the other backend."""
-    from creeping.plotting import scene
-
     ax = figure.add_axes(place)
     # more pixels than the file has: reduced on saving, which smooths every edge
     inches = figure.get_size_inches()
     width, height = (round(FINER * dpi * float(size) * share) for size, share in zip(inches, place[2:], strict=True))
-    image = scene.render(drawing, (width, height), scale=FINER * dpi / 72)
+    image = render(drawing, (width, height), scale=FINER * dpi / 72)
     low, high = drawing.frame
     middle = 0.5 * (low + high)
     half_height = max(0.5 * float(high[1] - low[1]), 0.5 * float(high[0] - low[0]) * height / width)

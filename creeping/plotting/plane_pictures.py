@@ -18,28 +18,18 @@ from creeping.field.comparison import decibels, shown_range
 from creeping.field.cut_result import FieldCut, grid_points, status_words
 from creeping.field.point_result import FieldStatus
 from creeping.geometry.parts import inside, why_no_rays
-from creeping.plotting.coloured_body import NOTHING
-from creeping.plotting.coupling_pictures import LEAST_SAMPLES, at_phase
-from creeping.plotting.palette import add_bar, beyond
-from creeping.plotting.pictures import axes_or_new, new_figure, save_figure, wave_title
+from creeping.plotting import pages
+from creeping.plotting.coloured_body import LEAST_SAMPLES, NOTHING, at_phase
 
-SHOWS = ("level", "magnitude", "wave")
-MOST_FRONTS = 40.0
-"""Wavelengths across a picture up to which it has wave fronts unless they are asked for."""
 PAGE = 6.4  # inches
-
 FRONT = "#ffffff"
 """Colour of wave fronts."""
-
 SECTION = "#5a6872"
 """Colour of the body's section."""
 HATCH, HATCHED = "///", "#6d767d"
 DOUBTFUL = "#a3476a", "#ffffff"
 """Colours in the legend of what is hatched upon the colours of the field."""
 DOTS, DOTTED = "....", "#9db4c2"
-OUTLINE = 400
-"""Points along the longer side by which the body's section is drawn."""
-_CENTRE: dict[str, Any] = {"ha": "center", "va": "center"}
 
 
 def plot_field_cut(
@@ -85,10 +75,9 @@ def plot_field_cut(
     InvalidInputError
         On an unknown quantity or kind of picture, a bad span, or wave fronts of a cut that is too coarse for them.
     """
-    fresh, ax = axes_or_new(ax, _page(cut))
+    fresh, ax = pages.axes_or_new(ax, _page(cut))
     _draw(cut, ax, quantity=quantity, show=show, fronts=fronts, phase=phase, span=span)
-    if fresh:
-        ax.set_title(_title(cut), fontsize=9, parse_math=False)
+    pages.finished(ax, fresh, _title(cut), legend=False)
     if fresh if legend is None else legend:
         add_cut_legend(cut, ax, fresh=fresh, fronts=_with_fronts(cut, show, fronts))
     return ax
@@ -143,16 +132,14 @@ def field_cut_picture(
     ...     field_cut_picture(f"{folder}/cut.png", cut, fronts=False, dpi=60)
     """
     width, height = _page(cut)
-    figure = new_figure((width, height if not error else 2 * height - 0.7))
-    figure.set_layout_engine("constrained")
-    panels = figure.subplots(2, 1, sharex=True) if error else [figure.add_subplot()]
-    _draw(cut, panels[0], quantity=quantity, show=show, fronts=fronts, phase=phase, span=span)
-    if error:
-        panels[0].set_xlabel("")
-        _draw_error(cut, panels[1], span)
-    panels[0].set_title(title or _title(cut), fontsize=9, parse_math=False)
-    add_cut_legend(cut, panels[0], fresh=True, fronts=_with_fronts(cut, show, fronts))
-    save_figure(figure, path, dpi)
+    with pages.written_figure(path, (width, height if not error else 2 * height - 0.7), dpi) as figure:
+        panels = figure.subplots(2, 1, sharex=True) if error else [figure.add_subplot()]
+        _draw(cut, panels[0], quantity=quantity, show=show, fronts=fronts, phase=phase, span=span)
+        if error:
+            panels[0].set_xlabel("")
+            _draw_error(cut, panels[1], span)
+        pages.finished(panels[0], True, title or _title(cut), legend=False)
+        add_cut_legend(cut, panels[0], fresh=True, fronts=_with_fronts(cut, show, fronts))
 
 
 def _draw(
@@ -176,9 +163,9 @@ def _draw(
         label = f"Re({of} e$^{{-iωt}}$), ωt = {np.degrees(phase):.4g}°" if phase else f"Re({of})"
         values, look = wave, {"vmin": -high, "vmax": high, "cmap": "RdBu_r"}
     else:
-        raise InvalidInputError(f"show = {show!r} is not one of {', '.join(SHOWS)}")
+        raise InvalidInputError(f"show = {show!r} is not one of level, magnitude, wave")
     values = np.where(missing, np.nan, np.where(np.isneginf(values), look["vmin"], values))
-    _paint(cut, ax, values, label, beyond(values, look["vmin"], look["vmax"]), look)
+    _paint(cut, ax, values, label, pages.beyond(values, look["vmin"], look["vmax"]), look)
     if _with_fronts(cut, show, fronts):
         shown = np.where(missing, np.nan, _filled(wave, cut.outside))
         ax.contour(cut.across, cut.up, shown, [0.0], colors=FRONT, linewidths=0.5, alpha=0.6, zorder=1.4)
@@ -192,7 +179,7 @@ def _draw_error(cut: FieldCut, ax: Any, span: float) -> None:
     low, high = shown_range([np.clip(finite, *np.percentile(finite, [0.5, 100.0]))], span)
     look = {"vmin": low, "vmax": high, "cmap": "viridis"}
     shown = np.where(np.isneginf(levels), low, levels)
-    _paint(cut, ax, shown, "20 log$_{10}$ error (dB)", beyond(shown, low, np.inf), look)
+    _paint(cut, ax, shown, "20 log$_{10}$ error (dB)", pages.beyond(shown, low, np.inf), look)
     hatch(cut, ax, None)
     dress(cut, ax)
 
@@ -211,7 +198,7 @@ def _paint(cut: FieldCut, ax: Any, values: FloatArray, label: str, extend: str, 
         cover = np.zeros((*unknown.shape, 4))
         cover[unknown] = to_rgba(NOTHING)
         ax.imshow(cover, interpolation="nearest", zorder=1.45, **way)
-    add_bar(ax.figure, image, label, extend=extend, fontsize=9, ax=ax, shrink=0.9, pad=0.02)
+    pages.add_bar(ax.figure, image, label, extend=extend, fontsize=9, ax=ax, shrink=0.9, pad=0.02)
 
 
 def _top(sizes: FloatArray, share: float) -> float:
@@ -237,7 +224,8 @@ def _with_fronts(cut: FieldCut, show: str, fronts: bool | None) -> bool:
             f"wave fronts of points {cut.step:.3g} apart: a wavelength has {wavelength / cut.step:.2g}; give a step of "
             f"{wavelength / LEAST_SAMPLES:.2g} or less, or fronts=False"
         )
-    few = max(np.ptp(cut.across), np.ptp(cut.up)) <= MOST_FRONTS * wavelength
+    # more than 40 fronts across a picture hide it
+    few = max(np.ptp(cut.across), np.ptp(cut.up)) <= 40.0 * wavelength
     return bool(fine and few and show != "wave") if fronts is None else fronts
 
 
@@ -246,7 +234,7 @@ def _title(cut: FieldCut) -> str:
     ok = field.ok & np.isfinite(field.error)
     off = field.error[ok]
     told = f"; error {np.median(off):.1g} {field.unit} in the median, {off.max():.1g} at most" if off.size else ""
-    return f"{wave_title(field, field.length_unit)}{told}"
+    return f"{pages.wave_title(field, field.length_unit)}{told}"
 
 
 def _page(cut: FieldCut) -> tuple[float, float]:
@@ -288,7 +276,8 @@ def dress(cut: FieldCut, ax: Any) -> None:
     """Section of the body, shadow line, direction of the wave and axes."""
     from matplotlib.patheffects import withStroke
 
-    share = max(1, int(np.ceil(OUTLINE / max(cut.outside.shape))))
+    # 400 points along the longer side, so that the section is drawn round
+    share = max(1, int(np.ceil(400 / max(cut.outside.shape))))
     across, up = (np.linspace(one[0], one[-1], share * (len(one) - 1) + 1) for one in (cut.across, cut.up))
     points = grid_points(cut.point, cut.axes, across, up)
     level = _level(cut.body, points.reshape(-1, 3)).reshape(points.shape[:2])
@@ -300,9 +289,8 @@ def dress(cut: FieldCut, ax: Any) -> None:
     if np.hypot(*along) > 0.2:
         middle = np.array([0.14, 0.9])
         box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
-        ax.annotate(
-            "d", middle - 0.085 * along, xycoords="axes fraction", fontsize=9, weight="bold", bbox=box, **_CENTRE
-        )
+        look: dict[str, Any] = {"fontsize": 9, "weight": "bold", "ha": "center", "va": "center", "bbox": box}
+        ax.annotate("d", middle - 0.085 * along, xycoords="axes fraction", **look)
         arrow = {"arrowstyle": "-|>", "color": "#111111", "linewidth": 1.4, "shrinkA": 0, "shrinkB": 0}
         arrow["path_effects"] = [withStroke(linewidth=3.2, foreground="#ffffff")]
         ends = middle + 0.08 * along, middle - 0.05 * along

@@ -18,27 +18,22 @@ from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from creeping._typing import Any, FloatArray
 from creeping.errors import CreepingError
-from creeping.field.boundary import BoundaryLike
 from creeping.plotting._drawing import Drawing, View, compose
-from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, Stroke
+from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, RayOptions, Stroke
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowLine
 from creeping.storage.reading import bytes_of
 
-DEPTH_UNITS = 40.0  # of 1/65000 of the depth of the scene
-
-
 REMEDY = "on Debian or Ubuntu install libegl1 libgl1-mesa-dri libx11-6"
 TIMEOUT = 60.0
-LIBRARIES = ("/usr/lib", "/usr/lib64", f"/usr/lib/{platform.machine()}-linux-gnu", "/usr/share/glvnd")
-"""Folders of the libraries that a picture needs."""
 _SCRIPT = """
 import pyvista
 plotter = pyvista.Plotter(off_screen=True, window_size=(16, 16))
@@ -56,11 +51,8 @@ def plot_rays_3d(
     *,
     plotter: Any = None,
     view: View | None = None,
-    rays: int = 48,
-    until: float | None = None,
-    wavenumber: float | None = None,
-    boundary: BoundaryLike = "hard",
     legend: bool = True,
+    **shown: Unpack[RayOptions],
 ) -> Any:
     """Draw the body, its shadow line, creeping rays and iso-phase curves with pyvista.
 
@@ -97,7 +89,6 @@ def plot_rays_3d(
     require_gl()
     import pyvista
 
-    shown: dict[str, Any] = {"rays": rays, "until": until, "wavenumber": wavenumber, "boundary": boundary}
     drawing = compose(line, fan, curves, view=view, **shown)
     if plotter is None:
         plotter = pyvista.Plotter(window_size=(1200, 1000))
@@ -113,7 +104,9 @@ def require_gl() -> None:
     probe = gl_available()
     if not probe.ok:
         raise CreepingError(f"pyvista cannot draw here: {probe.reason}; or draw with matplotlib")
-    _prefer_egl()
+    # without an X server VTK tries one first and complains before it takes EGL: it is told what it will find
+    if sys.platform == "linux" and not os.environ.get("DISPLAY"):
+        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
 
 def draw(plotter: Any, drawing: Drawing, *, scale: float = 2.0) -> None:
@@ -156,12 +149,6 @@ def _image(plotter: Any) -> NDArray[np.float32]:
     return np.asarray(plotter.screenshot(return_img=True), dtype=np.float32)[..., :3] / np.float32(255)
 
 
-def _prefer_egl() -> None:
-    """Without an X server VTK tries one first and complains before it takes EGL; tell it what it will find."""
-    if sys.platform == "linux" and not os.environ.get("DISPLAY"):
-        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-
-
 def _add_body(plotter: Any, drawing: Drawing) -> None:
     import pyvista
 
@@ -191,9 +178,10 @@ def _add_stroke(plotter: Any, stroke: Stroke, scale: float, name: str) -> None:
         name=name,
     )
     # the mesh and the polylines both sag by about the square of their spacing, so lines are drawn a little nearer
-    # to the camera, by rank; in depth only: lifting them off the body would bulge its outline
+    # to the camera, by rank, in units of 1/65000 of the depth of the scene; in depth only: lifting them off the body
+    # would bulge its outline
     actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()
-    actor.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, -DEPTH_UNITS * (3 + stroke.rank))
+    actor.mapper.SetRelativeCoincidentTopologyLineOffsetParameters(0.0, -40.0 * (3 + stroke.rank))
 
 
 def polylines(lines: Sequence[FloatArray]) -> Any:
@@ -333,7 +321,7 @@ def _key() -> str:
         libraries = 0
     found = sorted(
         (str(file), file.stat().st_size)
-        for root in LIBRARIES
+        for root in ("/usr/lib", "/usr/lib64", f"/usr/lib/{platform.machine()}-linux-gnu", "/usr/share/glvnd")
         for name in ("libX11.so*", "libEGL*.so*", "libGL*.so*", "libOpenGL.so*", "libgallium*.so*", "egl_vendor.d/*")
         for file in Path(root).glob(name)
         if file.is_file()

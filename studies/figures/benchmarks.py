@@ -18,8 +18,7 @@ import scatterers as sc
 from creeping._typing import Any, FloatArray
 from creeping.field.echo import Echo
 from creeping.files import read_cut
-from creeping.plotting.palette import COLOURS, EXACT
-from creeping.plotting.pictures import new_figure
+from creeping.plotting.pages import COLOURS, EXACT, new_figure
 from creeping.sweeping.echoes import echo_of
 from studies import tables
 from studies.figures.drawing import plain_ticks

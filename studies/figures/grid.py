@@ -11,7 +11,7 @@ from creeping.geodesics.bundle import random_bundle_points
 from creeping.phaseflow.splines import Grid
 from creeping.plotting._drawing import View
 from creeping.plotting._strokes import Stroke
-from creeping.plotting.palette import COLOURS
+from creeping.plotting.pages import COLOURS
 from studies.figures.drawing import draw_curves, end_error, panel, plain_ticks, rays_card
 
 BODY = sc.Ellipsoid(1.2, 0.8, 0.8)

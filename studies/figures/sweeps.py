@@ -11,8 +11,7 @@ import scatterers as sc
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
 from creeping.field.comparison import cross_section_decibels
 from creeping.geometry.directions import directions_from_angles, great_circle, theta_phi_grid
-from creeping.plotting.palette import COLOURS, EXACT
-from creeping.plotting.pictures import new_figure
+from creeping.plotting.pages import COLOURS, EXACT, new_figure
 from creeping.shadow.status import NEAR_SINGULAR, SINGULAR
 from studies.figures.drawing import plain_ticks
 from tests.reference import sphere

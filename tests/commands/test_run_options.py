@@ -9,6 +9,7 @@ from command_line import ran, table
 
 import creeping as cr
 from creeping.commands import run_field
+from creeping.commands.body import Output
 from creeping.commands.resuming import Unfinished
 from creeping.errors import InvalidInputError
 from creeping.field.forward import lobe_step
@@ -107,9 +108,8 @@ def test_pictures_have_titles_and_components(tmp_path, monkeypatch):
     job = run_field.job(None, "pec", ["cut:90", "cut:0", "cut:0:20"], X, **asked)
     body = sc.Sphere()
     fan = cr.launch(cr.DirectFlow(body, rtol=1e-6), cr.shadow_line(body, X), length=1.0, n_rays=16)
-    entry, names = job.write(
-        job.far_field(fan, Unfinished(tmp_path, tmp_path / "run.parts", {}))[0], fan, tmp_path, "matplotlib", "ball$"
-    )
+    far, _ = job.far_field(fan, Unfinished(tmp_path, tmp_path / "run.parts", {}))
+    entry, names = job.write(far, fan, Output(tmp_path, "ball$", backend="matplotlib"))
     assert {"far.png", "far_2.png", "far.csv"} <= set(names) and entry["unit"] == "m"
     assert drawn["far.png"][:2] == (361, ["φ = 90°", "φ = 0°"]) and drawn["far_2.png"][0] == 19
     assert drawn["wave"].startswith("500 MHz, k = ") and drawn["wave"].endswith("/m")

@@ -7,11 +7,9 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.explorer.preview import outline, preview_of, step_of
-from creeping.explorer.refined import cut_directions, refined_view
+from creeping.explorer.frames import cut_directions, outline, preview_of, refined_view, step_of
+from creeping.explorer.panel import _broken, cut_svg, legend, plane_svg, preview_plane_svg, preview_text, refined_text
 from creeping.explorer.request import ViewRequest, far_levels, wave_scale, wave_text
-from creeping.explorer.svg import _broken, cut_svg, plane_svg, preview_plane_svg
-from creeping.explorer.text import legend, preview_text, refined_text
 from creeping.explorer.wave import ENDED, FIELD_COLOURS, field_colours, fitted_span
 from creeping.geometry.surface import normal
 from creeping.geometry.triangulation import triangulate

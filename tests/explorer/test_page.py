@@ -10,7 +10,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.explorer.preview import preview_of
+from creeping.explorer.frames import preview_of
 from creeping.explorer.request import ViewRequest
 from tests.patience import HANGS, until
 

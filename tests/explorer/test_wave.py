@@ -7,13 +7,12 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.explorer.preview import preview_of, step_of
-from creeping.explorer.refined import refined_view
+from creeping.explorer.frames import preview_of, refined_view, step_of
+from creeping.explorer.panel import legend, wave_note
 from creeping.explorer.request import ViewRequest
-from creeping.explorer.text import legend, wave_note
 from creeping.explorer.wave import ENDED, WAVE_COLOURS, strengths, wave_colours
 from creeping.geometry.triangulation import triangulate
-from creeping.plotting.coupling_pictures import at_phase
+from creeping.plotting.coloured_body import at_phase
 from tests.patience import until
 from tests.reference import sphere
 

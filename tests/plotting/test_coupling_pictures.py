@@ -7,7 +7,8 @@ import shared_bodies as sc
 import creeping as cr
 from creeping.geometry.piecewise import drawn_mesh
 from creeping.plotting import coupling_picture
-from creeping.plotting.coupling_pictures import coupling_levels, front_strokes
+from creeping.plotting.coloured_body import front_strokes
+from creeping.plotting.coupling_pictures import coupling_levels
 
 BALL = sc.Sphere()
 

@@ -7,16 +7,16 @@ import pytest
 from fake_fields import echo_of
 
 from creeping.field.impulse import range_profile
-from creeping.plotting import echo_pictures
-from creeping.plotting.far_cuts import Curve, band_words, heights_of, minus
-from creeping.plotting.palette import curve_style
+from creeping.plotting import echo_pictures, pages
+from creeping.plotting.far_cuts import Curve, band_words, heights_of
+from creeping.plotting.pages import curve_style, minus
 
 
 @pytest.fixture
 def drawn(monkeypatch):
     """Figures that would be written."""
     figures = []
-    monkeypatch.setattr(echo_pictures, "save_figure", lambda figure, *_: figures.append(figure))
+    monkeypatch.setattr(pages, "save_figure", lambda figure, *_: figures.append(figure))
     return figures
 
 

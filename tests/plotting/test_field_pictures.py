@@ -7,7 +7,7 @@ import shared_bodies as sc
 import creeping as cr
 from creeping.errors import InvalidInputError
 from creeping.plotting import currents_picture, decay_picture, field_pictures, surface_field_picture
-from creeping.plotting.field_pictures import surface_levels
+from creeping.plotting.field_pictures import levels_of, surface_values
 from tests.reference import sphere
 
 K = 30.0
@@ -28,7 +28,7 @@ def at(angle):
 @pytest.mark.parametrize("boundary", ["hard", "soft", cr.ImpedanceBoundary(0.5 + 0.2j)])
 def test_levels_are_those_of_the_exact_series(fan, boundary):
     angles = np.array([0.0, 20.0, 50.0, 70.0, 80.0, 89.0, 91.0, 100.0, 120.0])
-    levels = surface_levels(fan, at(angles), wavenumber=K, boundary=boundary)
+    levels = levels_of(surface_values(fan, at(angles), wavenumber=K, boundary=boundary))
     cosine = -np.cos(np.radians(angles))
     if boundary == "soft":
         exact = sphere.surface_derivative(K, 1.0, cosine, "soft") / K

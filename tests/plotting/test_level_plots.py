@@ -7,7 +7,7 @@ import pytest
 from fake_fields import far_of
 
 import creeping as cr
-from creeping.plotting.pictures import new_figure
+from creeping.plotting.pages import new_figure
 from tests.reference import sphere
 
 

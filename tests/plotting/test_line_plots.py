@@ -5,7 +5,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.plotting.pictures import new_figure
+from creeping.plotting.pages import new_figure
 
 
 def drawn(ax, label):

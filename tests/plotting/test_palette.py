@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from colour_vision import EYES, contrast, difference, lab, of_hexadecimal, seen
 
-from creeping.plotting import palette
+from creeping.plotting import pages
 from creeping.plotting._strokes import RAY_COLOUR, STATUS_COLOURS
 from creeping.plotting.far_cuts import cut_curves
 
 GROUPS = {
-    "curves": palette.COLOURS,
-    "curves of the page": ("#111111", *palette.COLOURS[:2]),
+    "curves": pages.COLOURS,
+    "curves of the page": ("#111111", *pages.COLOURS[:2]),
     "shadow line": tuple(STATUS_COLOURS.values()),
     "shadow line and rays": (RAY_COLOUR, *list(STATUS_COLOURS.values())[1:]),
 }
@@ -42,7 +42,7 @@ def test_any_two_colours_of_a_picture_differ(group, eye):
 
 
 def test_curves_stand_out_from_white():
-    assert min(map(contrast, palette.COLOURS)) >= 3.0
+    assert min(map(contrast, pages.COLOURS)) >= 3.0
 
 
 def test_curves_of_a_picture_have_styles_of_their_own():

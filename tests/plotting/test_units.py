@@ -5,7 +5,7 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.files import write_csv
-from creeping.plotting import _facts, _strokes, coloured_body, field_pictures, parameter_plane
+from creeping.plotting import _strokes, coloured_body, field_pictures, line_plots, pages, presenter
 from creeping.plotting.coloured_body import currents_picture
 from creeping.plotting.field_pictures import decay_picture, surface_field_picture
 
@@ -21,8 +21,8 @@ def test_words_and_facts(fan):
     assert curve.unit == "m"
     for one in (fan.line, fan.line.curves[0], fan, curve):
         assert " m" in repr(one) and not any(word in repr(one) for word in (" L,", " L)", " L\n", "/L", " L at"))
-    facts = [_facts.of_line(fan.line), _facts.of_shadow_curve(fan.line.curves[0])]
-    facts += [_facts.of_fan(fan), _facts.of_curve(curve)]
+    facts = [presenter.of_line(fan.line), presenter.of_shadow_curve(fan.line.curves[0])]
+    facts += [presenter.of_fan(fan), presenter.of_curve(curve)]
     for rows in facts:
         told = dict(rows)
         assert told["length"].endswith(" m")
@@ -32,11 +32,11 @@ def test_words_and_facts(fan):
 def test_pictures_say_metres(fan, monkeypatch, tmp_path):
     curves = cr.iso_phase_curves(fan, [0.5, 1.0])
     assert _strokes.LevelColours.of(curves).words(0.5) == "travel time = 0.5 m"
-    ax = parameter_plane.plot_parameters(fan.line, fan, curves)
+    ax = line_plots.plot_parameters(fan.line, fan, curves)
     labels = [one.get_ylabel() for one in (*ax.figure.axes, *ax.child_axes)]
     assert "iso-phase curves: travel time (m)" in labels
     drawn, said = [], []
-    monkeypatch.setattr(field_pictures, "save_figure", lambda figure, *_: drawn.append(figure.axes[0]))
+    monkeypatch.setattr(pages, "save_figure", lambda figure, *_: drawn.append(figure.axes[0]))
     decay_picture(tmp_path / "a.png", fan, wavenumber=12.0, boundary="hard")
     assert drawn[0].get_xlabel() == "arclength from the shadow line (m)"
     assert drawn[0].get_title() == "Field of single rays, k = 12/m, hard boundary"

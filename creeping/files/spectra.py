@@ -1,0 +1,308 @@
+"""Results over frequency for other programs: Touchstone of couplings, SOFA of receivers; and STK of radar echoes.
+
+Touchstone, for programs that read N-port data:
+
+    h_ij = 2 pi r0 u_ij,   u of a source e^{ikr}/(4 pi r) on the body
+
+the field at port i of a source at port j, in units of what that source gives at a distance r0 along a hard plane, that
+is 1/(2 pi r0). It is written as S_ij: a transfer ratio without unit, not a scattering parameter: nothing is known
+of what ports reflect, S_ii is 0, and columns are not bounded by 1. Numbers are conjugated, for e^{+jwt}.
+
+SOFA (AES69), head-related transfer functions for programs that render sound or analyse arrays:
+
+    H(f) = conj F(r; x),   k = 2 pi f/c
+
+F of `creeping.field.sources`: what a receiver at x on the body or near it gets from a far source towards r, over what
+the origin gets of it with no body. SOFA counts time as e^{+iwt}, hence the conjugate; receivers and directions are in
+the body's axes, in which the listener is at the origin, looks along x and has z for up.
+
+STK (.rcs), radar cross sections, pattern type MonostaticRealSparse: rho, theta and dBsm, one row a direction. Rho is
+counted from z, 90 degrees less the elevation; theta is the azimuth, about z from x to y, within 180 degrees. The
+format's pages do not say from which axis theta starts where rho is from z; x is taken here.
+
+Sources: [AES69], conventions SimpleFreeFieldHRTF 1.0 and GeneralTF 2.0; Derivations, F25 and F27.
+"""
+
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from creeping._typing import Any, ComplexArray, FloatArray
+from creeping._version import __version__
+from creeping.errors import InvalidInputError
+from creeping.field.frequency import frequency
+from creeping.field.ports.coupling_result import Coupling
+from creeping.field.sources import SourcePattern
+from creeping.geometry.arguments import positive_number
+from creeping.geometry.checks import METRE
+from creeping.geometry.directions import angles_of
+from creeping.storage.atomic import written_aside
+from creeping.storage.memory import required
+
+if TYPE_CHECKING:
+    from creeping.field.echo import Echo
+
+HRTF, GENERAL = "SimpleFreeFieldHRTF", "GeneralTF"
+DISTANCE = 1.0
+"""What a SOFA file says of how far sources are, m: it has no word for far fields."""
+
+
+def over_frequency(results: Any, kind: type, name: str, made_by: str, shared: Sequence[str]) -> list[Any]:
+    """Results of a kind at ascending wavenumbers that share some of their arrays, as a list.
+
+    Raises
+    ------
+    InvalidInputError
+        If they are none of that kind, of different arrays, or not in order; ``name`` says what they are.
+    """
+    given = list(results) if isinstance(results, Sequence) else []
+    if not given or not all(isinstance(one, kind) for one in given):
+        raise InvalidInputError(
+            f"{name} has none in it, or more than results of creeping.{made_by}; give a list of them"
+        )
+    for part in shared:
+        own = getattr(given[0], part)
+        other = [n for n, one in enumerate(given) if not np.array_equal(getattr(one, part), own)]
+        if other:
+            raise InvalidInputError(
+                f"{len(other)} of {len(given)} {name} are of other {part} than the first (first: number {other[0]}); "
+                "write one file for each set"
+            )
+    k = np.array([one.wavenumber for one in given])
+    if np.any(np.diff(k) <= 0):
+        raise InvalidInputError(f"wavenumbers {k.tolist()} do not ascend; sort the {name} by them")
+    return given
+
+
+def write_touchstone(
+    path: str | os.PathLike[str],
+    couplings: Sequence[Coupling],
+    *,
+    reference_distance: float,
+    sound_speed: float | None = None,
+) -> None:
+    """Write couplings of the same ports at ascending wavenumbers as Touchstone, version 1.
+
+    Parameters
+    ----------
+    path : str or path
+        File to write, by custom of suffix .sNp for N ports; replaced at once when complete.
+    couplings : sequence of Coupling
+        One for each wavenumber.
+    reference_distance : float, L
+        r0 of the transfer ratio.
+    sound_speed : float, optional, m/s
+        For the frequency of a wavenumber; that of light if not given.
+
+    Raises
+    ------
+    InvalidInputError
+        If couplings are of slots or monopoles or both, of different ports or not in order.
+    CreepingError
+        If the file cannot be written.
+    """
+    unit = positive_number(reference_distance, "reference_distance")
+    given = over_frequency(couplings, Coupling, "couplings", "coupling", ("ports",))
+    electric = [n for n, one in enumerate(given) if one.boundary == "pec"]
+    if electric:
+        raise InvalidInputError(
+            f"{len(electric)} of {len(given)} couplings are of a conductor (first: number {electric[0]}), which are no "
+            "ratios of pressures; write those of creeping.coupling"
+        )
+    ports, k = given[0].ports, np.array([one.wavenumber for one in given])
+    hertz = frequency(k, sound_speed=sound_speed)
+    with written_aside(path) as aside, aside.open("w", encoding="ascii", newline="\n") as stream:
+        stream.write(f"! creeping: couplings of {len(ports)} ports on a hard body, as transfer ratios 2 pi r0 u\n")
+        stream.write(
+            f"! r0 = {unit!r} {given[0].length_unit}; no scattering parameters: S_ii is not known, and 0 here\n"
+        )
+        for number, port in enumerate(ports.tolist()):
+            stream.write(f"! port {number + 1} at {' '.join(map(repr, port))} {given[0].length_unit}\n")
+        bad = sum(int(np.sum(np.triu(~one.ok, 1))) for one in given)
+        if bad:
+            stream.write(f"! {bad} pairs of ports at some frequency have a status that is not OK\n")
+        stream.write("# HZ S RI R 1\n")
+        for at, one in zip(np.asarray(hertz).tolist(), given, strict=True):
+            stream.writelines(_lines(at, 2 * np.pi * unit, one.values))
+
+
+def _lines(hertz: float, factor: float, values: ComplexArray) -> Iterable[str]:
+    """Lines of one frequency; of two ports, column by column on one line, as version 1 has it."""
+    h = factor * np.conj(np.where(np.isfinite(values), values, 0.0))
+    rows = [h.T.ravel()] if len(h) == 2 else list(h)
+    first = True
+    for row in rows:
+        for begin in range(0, len(row), 4):
+            pairs = " ".join(f"{z.real!r} {z.imag!r}" for z in row[begin : begin + 4].tolist())
+            yield f"{hertz!r} {pairs}\n" if first else f"  {pairs}\n"
+            first = False
+
+
+def write_stk(path: str | os.PathLike[str], echo: Echo, channel: str, frequency: int = 0) -> None:
+    """Write the backscatter of one polarisation at one frequency, on a grid of azimuth and elevation, for STK.
+
+    Parameters
+    ----------
+    path : str or path
+        File to write; replaced at once when complete.
+    echo : Echo
+        Of radar cross sections; its directions are all pairs of two or more azimuths and two or more elevations.
+    channel : str
+        One of the echo's.
+    frequency : int
+        Its number among those of the echo.
+
+    Raises
+    ------
+    InvalidInputError
+        If the echo is none of these, or a level is not finite.
+    CreepingError
+        If the file cannot be written.
+    """
+    if echo.quantity != "rcs" or echo.incidence is not None:
+        raise InvalidInputError("a .rcs file holds radar cross sections in backscatter, no target strength, no cut")
+    if channel not in echo.channels or not 0 <= frequency < len(echo.wavenumbers):
+        raise InvalidInputError(
+            f"channel {channel!r} and frequency {frequency!r} are not among {', '.join(echo.channels)} and 0 to "
+            f"{len(echo.wavenumbers) - 1}"
+        )
+    pairs = {(round(a, 9), round(e, 9)) for a, e in zip(echo.azimuth.tolist(), echo.elevation.tolist(), strict=True)}
+    azimuths, elevations = {a for a, _ in pairs}, {e for _, e in pairs}
+    if min(len(azimuths), len(elevations)) < 2 or not len(azimuths) * len(elevations) == len(pairs) == len(
+        echo.azimuth
+    ):
+        raise InvalidInputError(
+            f"a .rcs file holds a grid: {len(pairs)} directions are not all pairs of {len(azimuths)} azimuths and "
+            f"{len(elevations)} elevations, two of each at least"
+        )
+    levels = echo.levels()[echo.channels.index(channel), :, frequency]
+    if not np.all(np.isfinite(levels)):
+        raise InvalidInputError(f"{np.sum(~np.isfinite(levels))} of {len(levels)} levels are not finite")
+    theta = np.where(np.abs(echo.azimuth) <= 180, echo.azimuth, np.mod(echo.azimuth + 180, 360) - 180)
+    rho = 90 - echo.elevation
+    order = np.lexsort((theta, rho))
+    head = ["stk.v.9.0", "BEGIN rcs", "RCSPatternType MonostaticRealSparse", "RhoAxis RhoFromZ", "IsBistatic no"]
+    rows = (f"{rho[i]:.10g} {theta[i]:.10g} {levels[i]:.10g}" for i in order)
+    lines = [*head, f"NumPoints {len(levels)}", "BEGIN rcsdata", *rows, "END rcsdata", "END rcs"]
+    with written_aside(path) as aside:
+        aside.write_text("\n".join(lines) + "\n", encoding="ascii", newline="\n")
+
+
+def write_sofa(
+    path: str | os.PathLike[str],
+    patterns: Sequence[SourcePattern],
+    *,
+    sound_speed: float,
+    unit_length: float = 1.0,
+    convention: str = "auto",
+    title: str = "",
+) -> None:
+    """Write what receivers on a body or near it get from far sources, over frequency, as a SOFA file.
+
+    Parameters
+    ----------
+    path : str or path
+        File to write, of suffix .sofa; replaced at once when complete.
+    patterns : sequence of SourcePattern
+        One for each wavenumber, ascending, of the same directions, sources and boundary. By reciprocity their sources
+        are the receivers, such as ears, and their directions those of the far sources.
+    sound_speed : float, m/s
+    unit_length : float, m
+        Length of the body's unit L; 1 for bodies in metres.
+    convention : {"auto", "SimpleFreeFieldHRTF", "GeneralTF"}
+        By default that of heads for two receivers, the left one (of larger y) first, and the general one for other
+        numbers of them.
+    title : str
+        Of the file; the name of the body, say.
+
+    Raises
+    ------
+    InvalidInputError
+        If patterns are of different directions, sources or boundaries or not in order, on a bad speed, unit,
+        suffix or convention, and for ears that are not left and right.
+    CreepingError
+        If the library sofar is missing, or the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile, creeping as cr, scatterers as sc
+    >>> flow, ears = cr.DirectFlow(sc.Sphere(0.0875)), [(0, 0.0875, 0), (0, -0.0875, 0)]
+    >>> heard = [cr.source_pattern(flow, ears, [(1, 0, 0), (0, 1, 0)], wavenumber=k) for k in (100.0, 200.0)]
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_sofa(f"{folder}/head.sofa", heard, sound_speed=343.0)
+    """
+    if Path(path).suffix != ".sofa":
+        raise InvalidInputError(f"{os.fspath(path)!r} is no name of a SOFA file; end it in .sofa")
+    given = over_frequency(patterns, SourcePattern, "patterns", "source_pattern", ("directions", "sources"))
+    first = given[0]
+    kinds = sorted({f"{one.boundary}, lengths in {one.length_unit}" for one in given})
+    if len(kinds) > 1:
+        raise InvalidInputError(f"patterns are of several bodies: {'; '.join(kinds)}; write one file for each")
+    unit = positive_number(unit_length, "unit_length")
+    if first.length_unit == METRE and unit != 1:
+        raise InvalidInputError(f"unit_length = {unit:g} m, of a body whose lengths are metres; leave it out")
+    speed = positive_number(sound_speed, "sound_speed")
+    hertz = np.asarray(frequency(np.array([one.wavenumber for one in given]) / unit, sound_speed=speed))
+    receivers = unit * first.sources
+    values = np.stack([one.values for one in given], axis=-1)
+    library = required("sofar", use="SOFA files need", extra="hrtf")
+    file = _filled(library.Sofa(_convention(convention, receivers)), first.directions, receivers, hertz, values)
+    file.GLOBAL_Title = title
+    file.GLOBAL_Comment = _comment(given, speed, unit)
+    with written_aside(path) as aside:
+        library.write_sofa(str(aside), file)
+
+
+def _convention(asked: str, receivers: FloatArray) -> str:
+    """Name of the convention for receivers (r, 3), m."""
+    if asked not in ("auto", HRTF, GENERAL):
+        raise InvalidInputError(f"convention = {asked!r} is none of 'auto', {HRTF!r}, {GENERAL!r}")
+    if asked == "auto":
+        asked = HRTF if len(receivers) == 2 else GENERAL
+    if asked == GENERAL:
+        return asked
+    if len(receivers) != 2:
+        raise InvalidInputError(f"{HRTF} has two ears, not {len(receivers)}; give convention={GENERAL!r}")
+    left, right = receivers[:, 1].tolist()
+    # programs take the first for the left ear without a look at its place
+    if not left > right:
+        raise InvalidInputError(
+            f"ears at y = {left:g} and {right:g} m: {HRTF} has the left one, of larger y, first (the listener looks "
+            f"along x, z is up); exchange them, or give convention={GENERAL!r} if they are no ears"
+        )
+    return asked
+
+
+def _filled(file: Any, directions: FloatArray, receivers: FloatArray, hertz: FloatArray, values: ComplexArray) -> Any:
+    """A file with directions (m, 3), receivers (r, 3), frequencies (n,) and F (m, r, n) set."""
+    theta, phi = angles_of(directions)
+    azimuth, elevation = np.mod(np.degrees(phi), 360.0), 90.0 - np.degrees(theta)
+    file.SourcePosition = np.stack([azimuth, elevation, np.full(len(directions), DISTANCE)], axis=-1)
+    file.SourcePosition_Type, file.SourcePosition_Units = "spherical", "degree, degree, metre"
+    file.ReceiverPosition = receivers
+    file.ReceiverPosition_Type, file.ReceiverPosition_Units = "cartesian", "metre"
+    file.N = hertz
+    heard = np.conj(np.where(np.isfinite(values), values, 0.0))
+    file.Data_Real, file.Data_Imag = np.ascontiguousarray(heard.real), np.ascontiguousarray(heard.imag)
+    file.GLOBAL_RoomType = "free field"
+    file.GLOBAL_ApplicationName, file.GLOBAL_ApplicationVersion = "creeping", __version__
+    return file
+
+
+def _comment(given: Sequence[SourcePattern], speed: float, unit: float) -> str:
+    """What the numbers are, for those who open the file."""
+    bad = sum(int(np.sum(~one.ok)) for one in given)
+    error = max((float(np.max(one.error[one.ok], initial=0.0)) for one in given), default=0.0)
+    return (
+        f"creeping {__version__}: asymptotic, for short waves on a smooth body, {given[0].boundary} "
+        f"boundary, unit of length {unit:.10g} m, sound speed {speed:.10g} m/s. Sources are in the far field; their "
+        f"distance of {DISTANCE:g} m is nominal. Values are relative to the free field at the origin, phases with it, "
+        f"for exp(+i omega t). Largest stated error {error:.3g}; of {bad} of {sum(one.values.size for one in given)} "
+        "values the status is not OK."
+    )
