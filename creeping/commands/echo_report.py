@@ -21,9 +21,9 @@ from creeping.commands.options import EchoOptions, FileOptions
 from creeping.commands.resuming import SUMMARY, asked_for, begun, kept
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import parse_boundary
-from creeping.field.comparison import Comparison, compare
-from creeping.field.echo import Echo
-from creeping.field.impulse import RangeProfile, range_profile
+from creeping.field.results.comparison import Comparison, compare
+from creeping.field.results.echo import Echo
+from creeping.field.results.impulse import RangeProfile, range_profile
 from creeping.files import read_cut, write_echo, write_mat, write_profile
 from creeping.files.measured import MeasuredCut
 from creeping.geometry.checks import WRONG_SIGNS, wrong_signs

@@ -13,9 +13,9 @@ from creeping.commands.forecast import size_words
 from creeping.commands.wave import cure_of
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import boundary_name, parse_boundary
-from creeping.field.forward import lobe_step
 from creeping.field.frequency import frequency as frequency_of
 from creeping.field.frequency import is_length, wavenumber
+from creeping.field.waves.forward import lobe_step
 from creeping.geometry.surface import Surface
 from creeping.sweeping.results import POLARISATIONS
 

@@ -17,10 +17,10 @@ from creeping.errors import InvalidInputError
 from creeping.explorer.request import ViewRequest
 from creeping.explorer.wave import RayWave, ray_wave, segments
 from creeping.field.body_currents import affordable, cached_currents, has_expansions
-from creeping.field.comparison import decibels
 from creeping.field.far import far_field
-from creeping.field.far_result import FarField
 from creeping.field.on_body import ray_envelope
+from creeping.field.results.comparison import decibels
+from creeping.field.results.far_result import FarField
 from creeping.field.validity_range import Validity, validity
 from creeping.geodesics.equations import natural_horizon
 from creeping.geometry.directions import directions_from_angles

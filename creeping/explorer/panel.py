@@ -15,8 +15,8 @@ from creeping._version import __version__
 from creeping.explorer.frames import Preview, Refined, requested_curves
 from creeping.explorer.request import ViewRequest, far_levels, far_name, wave_text
 from creeping.explorer.wave import ENDED, FIELD_COLOURS, LEVEL_COLOURS, WAVE_COLOURS, ColourTable, Span
-from creeping.field.comparison import shown_range
-from creeping.field.far_result import FarField
+from creeping.field.results.comparison import shown_range
+from creeping.field.results.far_result import FarField
 from creeping.field.validity_range import WITHIN, Validity, validity_words
 from creeping.geometry.checks import unit_of
 from creeping.plotting._strokes import RAY_COLOUR, STATUS_COLOURS, line_pieces

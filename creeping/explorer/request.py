@@ -14,8 +14,8 @@ import numpy as np
 from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import BoundaryLike, parse_boundary
-from creeping.field.comparison import cross_section_decibels, decibels
 from creeping.field.frequency import frequency, suited
+from creeping.field.results.comparison import cross_section_decibels, decibels
 from creeping.geometry.directions import angles_of, directions_from_angles
 
 BOUNDARIES = ("soft", "hard", "pec", "impedance")

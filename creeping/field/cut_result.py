@@ -21,10 +21,10 @@ from creeping.field.arguments import PLAIN, checked, checked_plain
 from creeping.field.body_currents import affordable
 from creeping.field.boundary import BoundaryLike
 from creeping.field.conductor.near import VECTOR, conductor_field
-from creeping.field.conductor_result import ConductorField
 from creeping.field.equation.solution import Solution
 from creeping.field.near import near_field
-from creeping.field.point_result import FieldStatus, NearField
+from creeping.field.results.conductor_result import ConductorField
+from creeping.field.results.point_result import FieldStatus, NearField
 from creeping.geometry.arguments import number_between, one_of, positive_number, real_array
 from creeping.geometry.directions import unit_direction
 from creeping.geometry.parts import inside

@@ -1,14 +1,14 @@
 """The far field of a plane wave, u_s ~ f(r) e^{ikR}/R: by the currents of the whole body, or ray by ray.
 
 Currents (`creeping.field.currents`) have no caustics, blends or hand-overs, and measure their own error; their cost
-grows like k^2 with every direction. Rays (`creeping.field.far_rays`) cost the same at any k and tell what each of them
-gives; where the reflected field has a caustic they err. Their error is an estimate, whose level is measured against
-currents at a lower wavenumber (`creeping.field.far`) where the method was left to the program.
+grows like k^2 with every direction. Rays (`creeping.field.waves.far_rays`) cost the same at any k and tell what each of
+them gives; where the reflected field has a caustic they err. Their error is an estimate, whose level is measured
+against currents at a lower wavenumber (`creeping.field.far`) where the method was left to the program.
 
 Also here: the error of a far field by rays where currents cost too much: measured at a lower wavenumber, carried up.
 
 At the highest wavenumber k0 whose currents cost little, rays are compared with currents, which measure their own error
-epsilon, in directions spread over the sphere. With e the error that rays state (`creeping.field.far_rays`),
+epsilon, in directions spread over the sphere. With e the error that rays state (`creeping.field.waves.far_rays`),
 
     level = the 95th percentile of |f_rays - f_currents|/e at k0
     error = [(level e)^2 + (epsilon (k0/k)^p f_rms)^2]^(1/2),   p = 1, and 0 where part of the line launches no ray
@@ -37,11 +37,11 @@ from creeping.field.boundary import BoundaryLike, scalar_boundaries
 from creeping.field.currents.far_sum import far_by_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation.solving import solution_for
-from creeping.field.far_geometry import far_geometry
-from creeping.field.far_rays import field_of
-from creeping.field.far_result import FarField
-from creeping.field.piecewise_far import piecewise_far_field, tip_waves
+from creeping.field.results.far_result import FarField
 from creeping.field.validity_range import validity
+from creeping.field.waves.far_geometry import far_geometry
+from creeping.field.waves.far_rays import field_of
+from creeping.field.waves.piecewise_far import piecewise_far_field, tip_waves
 from creeping.geometry.arguments import one_of
 from creeping.geometry.checks import unit_of
 from creeping.geometry.directions import fibonacci_directions
@@ -95,7 +95,7 @@ def far_field(
         which takes minutes at high wavenumbers. For a body with edges the equation is that of `creeping.solve`;
         "auto" allows it half a minute, and uses coarse tiles, with a larger error, if fine ones take longer. If the
         equation is not solved for a body with edges, or a conductor with joints or tips, the field is the sum of
-        isolated rays and physical optics (`creeping.field.piecewise_far`); ``method`` is then "rays+optics".
+        isolated rays and physical optics (`creeping.field.waves.piecewise_far`); ``method`` is then "rays+optics".
 
     Returns
     -------

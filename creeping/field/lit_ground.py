@@ -24,8 +24,8 @@ from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale
 from creeping.field.currents.bounce import may_self_reflect
 from creeping.field.currents.nodes import LitNodes
-from creeping.field.point_result import FieldStatus, PointValues, Words
-from creeping.field.ray_sums import RaySum
+from creeping.field.results.point_result import FieldStatus, PointValues, Words
+from creeping.field.waves.ray_sums import RaySum
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan

@@ -36,14 +36,14 @@ from creeping.field.body_currents import affordable, cached_currents, solved_cur
 from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
 from creeping.field.currents.whole_body import SurfaceCurrents, far_enough, total_at
 from creeping.field.equation.currents import TileCurrents
-from creeping.field.far_geometry import fan_strips
 from creeping.field.marching.fan_waves import march_alone
-from creeping.field.near_wave import height_above, shed_waves
 from creeping.field.on_body import rays_on, total_on
-from creeping.field.point_result import FieldStatus, NearField, PointValues, judged, measured_field, zero_field
-from creeping.field.ray_sums import RaySum, own_error, ray_sum
-from creeping.field.surface import scalar_boundary
+from creeping.field.results.point_result import FieldStatus, NearField, PointValues, judged, measured_field, zero_field
 from creeping.field.validity_range import validity
+from creeping.field.waves.far_geometry import fan_strips
+from creeping.field.waves.near_wave import height_above, shed_waves
+from creeping.field.waves.ray_sums import RaySum, own_error, ray_sum
+from creeping.field.waves.surface import scalar_boundary
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.arguments import one_of
 from creeping.geometry.checks import unit_of

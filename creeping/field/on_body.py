@@ -18,7 +18,7 @@ goes on (`creeping.field.marching.fan_waves`). On a caustic either is infinite.
 
 Also here: each ray's own field from what the fan carries already; for pictures that follow a hand.
 
-First order of `creeping.field.surface`, with ξ = (k/2)^(1/3) A and A the fan's attenuation integral:
+First order of `creeping.field.waves.surface`, with ξ = (k/2)^(1/3) A and A the fan's attenuation integral:
 
     u e^{-ik(d.x0 + s)} = (ρ1/ρ2)^(1/6) |J|^(-1/2) e^{-iπN/2} g(ξ)          hard, impedance
     du/dn/k: the same with F(ξ)/m2                                          soft
@@ -36,7 +36,6 @@ import numpy as np
 from creeping._typing import ArrayLike, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import PLAIN, checked, checked_method, checked_plain, fock_parameter, scales
-from creeping.field.beams import length_scale
 from creeping.field.body_currents import affordable, cached_currents, solved_currents
 from creeping.field.boundary import Boundary, BoundaryLike, ImpedanceBoundary, boundary_name
 from creeping.field.creeping_modes import fock_scale
@@ -44,14 +43,15 @@ from creeping.field.currents.nodes import TAKEN_OVER, lit_part, lit_waves
 from creeping.field.currents.whole_body import POINTS as INNER
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation.currents import TileCurrents
-from creeping.field.far_geometry import fan_strips
 from creeping.field.lit_ground import composed, convex, lit_error, without_tips
 from creeping.field.marching.fan_waves import fan_waves, march_alone, marchable, marched_sum, marches, spread_out
-from creeping.field.point_result import FieldStatus, PointValues, SurfaceField, Words, judged, measured_field
-from creeping.field.ray_sums import NARROW_ALONE, RaySum, own_error, ray_sum, tube_share
+from creeping.field.results.point_result import FieldStatus, PointValues, SurfaceField, Words, judged, measured_field
 from creeping.field.special.fock import surface_function
-from creeping.field.surface import scalar_boundary, surface_waves
 from creeping.field.validity_range import validity
+from creeping.field.waves.beams import length_scale
+from creeping.field.waves.far_geometry import fan_strips
+from creeping.field.waves.ray_sums import NARROW_ALONE, RaySum, own_error, ray_sum, tube_share
+from creeping.field.waves.surface import scalar_boundary, surface_waves
 from creeping.geodesics.bundle import as_points, on_body
 from creeping.geometry.arguments import one_of
 from creeping.geometry.checks import unit_of

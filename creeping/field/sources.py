@@ -22,10 +22,10 @@ from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError, SingularIncidenceError
 from creeping.field.arguments import checked, checked_plain, observers_of
 from creeping.field.boundary import BoundaryLike, boundary_name
-from creeping.field.labelled import ArrayResult, directed
 from creeping.field.near import MISSING, near_field
-from creeping.field.point_result import FieldStatus, NearField
-from creeping.field.surface import scalar_boundary
+from creeping.field.results.labelled import ArrayResult, directed
+from creeping.field.results.point_result import FieldStatus, NearField
+from creeping.field.waves.surface import scalar_boundary
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.checks import unit_of
 from creeping.rays.fan import launch

@@ -27,15 +27,15 @@ import numpy as np
 from creeping._typing import ArrayLike, ComplexArray, FloatArray
 from creeping._version import __version__
 from creeping.errors import InvalidInputError
-from creeping.field.far_result import turned_to_azimuth
 from creeping.field.frequency import frequency, wavenumber
+from creeping.field.results.far_result import turned_to_azimuth
 from creeping.files.measured import lines_of
 from creeping.files.tables import angles_of
 from creeping.geometry.directions import directions_from_angles, unit_direction
 from creeping.storage.atomic import written_aside
 
 if TYPE_CHECKING:
-    from creeping.field.far_result import FarField
+    from creeping.field.results.far_result import FarField
 
 MOST_BLOCKS = 10_000
 MOST_ROWS, MOST_KEYS = 5_000_000, 100

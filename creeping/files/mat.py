@@ -12,7 +12,7 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping._version import __version__
 from creeping.errors import InvalidInputError
-from creeping.field.labelled import power
+from creeping.field.results.labelled import power
 from creeping.files.tables import angles_of, joined, number_of
 from creeping.geometry.checks import UNKNOWN, unit_of
 from creeping.geometry.evaluators import speed_of
@@ -24,8 +24,8 @@ from creeping.storage.atomic import written_aside
 
 if TYPE_CHECKING:
     from creeping.field.cut_result import FieldCut
-    from creeping.field.echo import Echo
-    from creeping.field.far_result import FarField
+    from creeping.field.results.echo import Echo
+    from creeping.field.results.far_result import FarField
 
 
 Content = tuple[dict[str, Any], dict[str, str]]

@@ -46,7 +46,7 @@ from creeping.storage.atomic import written_aside
 from creeping.storage.memory import required
 
 if TYPE_CHECKING:
-    from creeping.field.echo import Echo
+    from creeping.field.results.echo import Echo
 
 HRTF, GENERAL = "SimpleFreeFieldHRTF", "GeneralTF"
 DISTANCE = 1.0

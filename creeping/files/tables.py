@@ -12,7 +12,7 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.comparison import cross_section_decibels, decibels
+from creeping.field.results.comparison import cross_section_decibels, decibels
 from creeping.files.polylines import polydata
 from creeping.geometry.checks import UNKNOWN, unit_of
 from creeping.rays.fan import RayFan
@@ -22,9 +22,9 @@ from creeping.storage.atomic import written_aside
 
 if TYPE_CHECKING:
     from creeping.field.cut_result import FieldCut
-    from creeping.field.echo import Echo
-    from creeping.field.far_result import FarField
-    from creeping.field.impulse import RangeProfile
+    from creeping.field.results.echo import Echo
+    from creeping.field.results.far_result import FarField
+    from creeping.field.results.impulse import RangeProfile
 
 Column = tuple[str, str, Any]
 """Name, what it holds (nothing if the name says it), and values (rows,)."""

@@ -13,11 +13,11 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
-from creeping.field.comparison import decibels, shown_range
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
-from creeping.field.labelled import COMPONENTS
-from creeping.field.point_result import PointField
+from creeping.field.results.comparison import decibels, shown_range
+from creeping.field.results.labelled import COMPONENTS
+from creeping.field.results.point_result import PointField
 from creeping.geometry.checks import unit_of
 from creeping.geometry.incident import PlaneWave
 from creeping.geometry.parts import why_no_rays

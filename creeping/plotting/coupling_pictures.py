@@ -13,10 +13,10 @@ import numpy as np
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import BoundaryLike
-from creeping.field.comparison import decibels, shown_range
-from creeping.field.labelled import power
-from creeping.field.point_result import FieldStatus
 from creeping.field.ports.port_map import PortField, port_field
+from creeping.field.results.comparison import decibels, shown_range
+from creeping.field.results.labelled import power
+from creeping.field.results.point_result import FieldStatus
 from creeping.geometry.piecewise import drawn_mesh
 from creeping.geometry.surface import Surface, normal, project, size
 from creeping.plotting import pages

@@ -11,16 +11,16 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.comparison import decibels, shown_range
 from creeping.field.frequency import suited
-from creeping.field.impulse import range_profile
+from creeping.field.results.comparison import decibels, shown_range
+from creeping.field.results.impulse import range_profile
 from creeping.plotting import pages
 from creeping.plotting.far_cuts import Curve, band_words, draw_cut, heights_of
 
 if TYPE_CHECKING:
-    from creeping.field.comparison import Comparison
-    from creeping.field.echo import Echo
-    from creeping.field.impulse import ImpulseResponse, RangeProfile
+    from creeping.field.results.comparison import Comparison
+    from creeping.field.results.echo import Echo
+    from creeping.field.results.impulse import ImpulseResponse, RangeProfile
 
 SPAN = 60.0
 """Range of levels, dB."""

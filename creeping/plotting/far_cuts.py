@@ -15,12 +15,12 @@ import numpy as np
 
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
-from creeping.field.comparison import cross_section_decibels, decibels, shown_range
+from creeping.field.results.comparison import cross_section_decibels, decibels, shown_range
 from creeping.plotting import pages
 from creeping.plotting._cut_angles import CutAngles, cut_angles
 
 if TYPE_CHECKING:
-    from creeping.field.far_result import FarField
+    from creeping.field.results.far_result import FarField
 
 ABOVE = 10.0
 """Room for bands over the curves, dB."""

@@ -14,10 +14,10 @@ from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked
 from creeping.field.boundary import Boundary, BoundaryLike
-from creeping.field.comparison import decibels, shown_range
 from creeping.field.on_body import surface_field
-from creeping.field.point_result import SurfaceField
-from creeping.field.surface import scalar_boundary
+from creeping.field.results.comparison import decibels, shown_range
+from creeping.field.results.point_result import SurfaceField
+from creeping.field.waves.surface import scalar_boundary
 from creeping.geometry.checks import unit_of
 from creeping.plotting._drawing import View, caption, compose
 from creeping.plotting._strokes import chosen_rays

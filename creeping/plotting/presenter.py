@@ -22,11 +22,11 @@ from creeping.plotting import coupling_pictures, echo_pictures, far_cuts, line_p
 
 if TYPE_CHECKING:
     from creeping.field.cut_result import FieldCut
-    from creeping.field.echo import Echo
-    from creeping.field.far_result import FarField
-    from creeping.field.impulse import ImpulseResponse, RangeProfile
-    from creeping.field.point_result import PointData
     from creeping.field.ports.coupling_result import Coupling
+    from creeping.field.results.echo import Echo
+    from creeping.field.results.far_result import FarField
+    from creeping.field.results.impulse import ImpulseResponse, RangeProfile
+    from creeping.field.results.point_result import PointData
     from creeping.field.sources import SourcePattern
     from creeping.geodesics.direct_flow import DirectFlow
     from creeping.geodesics.integrator import ErrorEstimate

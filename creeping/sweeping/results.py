@@ -14,7 +14,7 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping._version import __version__
-from creeping.field.labelled import COMPONENTS, power
+from creeping.field.results.labelled import COMPONENTS, power
 from creeping.geometry.checks import UNKNOWN, unit_of
 from creeping.geometry.directions import angles_of
 from creeping.geometry.piecewise import is_piecewise

@@ -19,7 +19,7 @@ from creeping.field.arguments import UNRESOLVED
 from creeping.field.boundary import BoundaryLike, parse_boundary
 from creeping.field.equation.solving import solve_together, solved_alone
 from creeping.field.far import far_field
-from creeping.field.far_result import FarField
+from creeping.field.results.far_result import FarField
 from creeping.geodesics.integrator import ErrorEstimate
 from creeping.geometry.arguments import rays_refused
 from creeping.geometry.surface import Surface

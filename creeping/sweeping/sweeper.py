@@ -10,10 +10,10 @@ from creeping.errors import SurfaceError
 from creeping.field.body_currents import affordable
 from creeping.field.boundary import BoundaryLike, parse_boundary, scalar_boundaries
 from creeping.field.far import far_field
-from creeping.field.far_geometry import FarGeometry
-from creeping.field.far_rays import Parts, parts_of
-from creeping.field.far_result import FarField
+from creeping.field.results.far_result import FarField
 from creeping.field.validity_range import launch_validity, validities
+from creeping.field.waves.far_geometry import FarGeometry
+from creeping.field.waves.far_rays import Parts, parts_of
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.states import ATTENUATION, P, X, whole_lanes
 from creeping.geometry.piecewise import is_piecewise

@@ -14,7 +14,7 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, ComplexArray, FloatArray
-from creeping.field.far_geometry import fan_strips
+from creeping.field.waves.far_geometry import fan_strips
 from creeping.geometry.surface import normal, project
 from creeping.rays.fan import RayFan
 from studies import tables

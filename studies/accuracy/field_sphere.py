@@ -14,9 +14,9 @@ import creeping as cr
 import scatterers as sc
 from creeping._typing import ComplexArray, FloatArray
 from creeping.field.boundary import scalar_boundaries
-from creeping.field.far_geometry import far_geometry
-from creeping.field.far_rays import isolated_rays
-from creeping.field.forward import fan_half
+from creeping.field.waves.far_geometry import far_geometry
+from creeping.field.waves.far_rays import isolated_rays
+from creeping.field.waves.forward import fan_half
 from creeping.rays.fan import RayFan
 from studies import tables
 from studies.tables import Row

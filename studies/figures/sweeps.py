@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
-from creeping.field.comparison import cross_section_decibels
+from creeping.field.results.comparison import cross_section_decibels
 from creeping.geometry.directions import directions_from_angles, great_circle, theta_phi_grid
 from creeping.plotting.pages import COLOURS, EXACT, new_figure
 from creeping.shadow.status import NEAR_SINGULAR, SINGULAR

@@ -12,7 +12,7 @@ from creeping.commands import run_field
 from creeping.commands.body import Output
 from creeping.commands.resuming import Unfinished
 from creeping.errors import InvalidInputError
-from creeping.field.forward import lobe_step
+from creeping.field.waves.forward import lobe_step
 from tests.reference import sphere
 
 X = (1.0, 0.0, 0.0)

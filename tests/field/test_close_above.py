@@ -5,7 +5,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.field.point_result import FieldStatus
+from creeping.field.results.point_result import FieldStatus
 from tests.reference import dipoles, sphere
 
 HEIGHTS = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0)

@@ -10,7 +10,7 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.errors import InvalidInputError
-from creeping.field.point_result import FieldStatus
+from creeping.field.results.point_result import FieldStatus
 from creeping.files import write_touchstone
 from creeping.geometry.surface import normal, project
 from tests.reference import stored

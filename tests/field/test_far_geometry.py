@@ -8,7 +8,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.field.far_geometry import TAPERED, far_geometry
+from creeping.field.waves.far_geometry import TAPERED, far_geometry
 from creeping.geometry.surface import normal
 
 

@@ -6,10 +6,10 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.field import on_body
-from creeping.field.beams import beam_sums
 from creeping.field.boundary import HARD
 from creeping.field.equation import effort
 from creeping.field.marching.fan_waves import fan_waves
+from creeping.field.waves.beams import beam_sums
 from creeping.rays.shedding import shed_on
 from tests.reference import clouds, fundamental, sphere, stored
 

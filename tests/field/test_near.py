@@ -7,7 +7,7 @@ import shared_bodies as sc
 import creeping as cr
 from creeping.errors import InvalidInputError
 from creeping.field.near import FINE
-from creeping.field.point_result import FieldStatus
+from creeping.field.results.point_result import FieldStatus
 from creeping.shadow.attachment import occluded
 from tests.reference import sphere
 

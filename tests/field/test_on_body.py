@@ -8,7 +8,7 @@ import creeping as cr
 from creeping.field import on_body
 from creeping.field.equation import effort
 from creeping.field.lit_ground import convex
-from creeping.field.point_result import FieldStatus
+from creeping.field.results.point_result import FieldStatus
 from tests.reference import clouds, fundamental, sphere
 
 

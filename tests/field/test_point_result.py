@@ -9,7 +9,7 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.field.equation import effort
-from creeping.field.point_result import FieldStatus, judged, measured_field
+from creeping.field.results.point_result import FieldStatus, judged, measured_field
 
 K = 20.0
 AT = np.array([(0.3, 0.1, 1.6), (0.0, 0.0, 1.5), (0.0, 0.2, -1.05), (0.0, 0.5, -2.0), (1.4, 0.0, 1.0)])

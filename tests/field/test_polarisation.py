@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from creeping.field.far_result import dyads, spherical_frame, turned_to_azimuth, wave_frame
+from creeping.field.results.far_result import dyads, spherical_frame, turned_to_azimuth, wave_frame
 
 
 def unit(v):

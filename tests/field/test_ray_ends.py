@@ -6,7 +6,7 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.field.boundary import HARD, scalar_boundaries
-from creeping.field.far_geometry import far_geometry
+from creeping.field.waves.far_geometry import far_geometry
 from tests.reference import sphere
 
 ANGLES = np.radians(np.arange(0.0, 181.0, 2.0))

@@ -6,8 +6,8 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.field.boundary import HARD
-from creeping.field.far_geometry import fan_strips
-from creeping.field.ray_sums import MERGING, fan_decay, fold_share, merging_error, ray_sum, tube_share
+from creeping.field.waves.far_geometry import fan_strips
+from creeping.field.waves.ray_sums import MERGING, fan_decay, fold_share, merging_error, ray_sum, tube_share
 from creeping.rays.shedding import shed_near, shed_on
 
 K = 30.0

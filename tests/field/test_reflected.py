@@ -7,7 +7,7 @@ from scipy.special import spherical_jn, spherical_yn
 
 import creeping as cr
 from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT, HARD, SOFT, Boundary, scalar_boundaries
-from creeping.field.reflected import plane_reflection, reflected_amplitude, reflected_error, reflection
+from creeping.field.waves.reflected import plane_reflection, reflected_amplitude, reflected_error, reflection
 from creeping.rays.specular import specular_points
 from tests.reference import sphere
 

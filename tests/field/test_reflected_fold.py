@@ -5,7 +5,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.field.far_geometry import fold_error
+from creeping.field.waves.far_geometry import fold_error
 from creeping.geometry.quadrature import body_nodes
 from creeping.shadow.nodes import prepared
 

@@ -9,9 +9,9 @@ import shared_bodies as sc
 import creeping as cr
 from creeping.field.arguments import fock_parameter
 from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT, HARD, SOFT, Boundary
-from creeping.field.far_geometry import far_geometry
-from creeping.field.shed_wave import SECOND_ORDER, shed_orders, shed_wave
 from creeping.field.special.fock import SERIES
+from creeping.field.waves.far_geometry import far_geometry
+from creeping.field.waves.shed_wave import SECOND_ORDER, shed_orders, shed_wave
 from creeping.geometry.directions import fibonacci_directions
 
 BODIES = {"ellipsoid": sc.Ellipsoid(1.2, 0.7, 0.9), "torus": sc.Torus(1.0, 0.4)}

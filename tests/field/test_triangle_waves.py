@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from creeping.field.piecewise_far import phase_sums
+from creeping.field.waves.piecewise_far import phase_sums
 
 K = 7.0
 

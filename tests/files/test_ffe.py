@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from creeping import InvalidInputError
-from creeping.field.far_result import FarField
+from creeping.field.results.far_result import FarField
 from creeping.files import read_ffe, write_csv, write_ffe
 from creeping.files.ffe import grid_directions
 from creeping.files.tables import angles_of

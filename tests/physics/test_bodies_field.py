@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import creeping as cr
-from creeping.field.far_geometry import fan_strips
+from creeping.field.waves.far_geometry import fan_strips
 from creeping.rays.shedding import shed_near
 from creeping.shadow.attachment import occluded
 from studies.accuracy import field_bodies as bodies

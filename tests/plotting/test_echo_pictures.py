@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fake_fields import echo_of
 
-from creeping.field.impulse import range_profile
+from creeping.field.results.impulse import range_profile
 from creeping.plotting import echo_pictures, pages
 from creeping.plotting.far_cuts import Curve, band_words, heights_of
 from creeping.plotting.pages import curve_style, minus

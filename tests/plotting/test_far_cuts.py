@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from creeping import InvalidInputError
-from creeping.field.comparison import decibels, shown_range
+from creeping.field.results.comparison import decibels, shown_range
 from creeping.plotting import far_cut_picture
 from creeping.plotting.far_cuts import cut_curves
 

@@ -6,7 +6,7 @@ import shared_bodies as sc
 from body_checks import unit
 
 import creeping as cr
-from creeping.field.far_geometry import far_geometry
+from creeping.field.waves.far_geometry import far_geometry
 from creeping.geodesics.pieces import trace_to
 from creeping.geodesics.states import P, pack
 from creeping.rays import aimed

@@ -5,7 +5,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.field.labelled import power
+from creeping.field.results.labelled import power
 from creeping.sweeping.echoes import echo_of, monostatic_method
 from tests.reference import sphere
 

@@ -6,7 +6,7 @@ import shared_bodies as sc
 from oracles.plain_sweep import PlainSweeper
 
 import creeping as cr
-from creeping.field.far_geometry import FarGeometry
+from creeping.field.waves.far_geometry import FarGeometry
 from creeping.rays.tracer import RayTracer
 from creeping.shadow.many import shadow_lines
 from creeping.sweeping.request import sweep_request

@@ -28,7 +28,7 @@ from creeping.field.conductor.on_body import OnConductor, on_conductor
 from creeping.field.currents.conductor import ConductorCurrents
 from creeping.field.currents.whole_body import level_at
 from creeping.field.near import GRAZING, feet_of, layer_terms, solved
-from creeping.field.point_result import FieldStatus, PointValues, measured_field
+from creeping.field.results.point_result import FieldStatus, PointValues, measured_field
 from creeping.geometry.quadrature import SYMMETRIC, BodyNodes, body_nodes
 from creeping.rays.fan import RayFan
 from creeping.shadow.attachment import occluded

@@ -23,14 +23,14 @@ import numpy as np
 
 from creeping._typing import BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.arguments import scales, transverse_ratios
-from creeping.field.beams import STRONG, beams_beside_rays, blended_sum, variation
 from creeping.field.boundary import ELECTRIC_HARD, SOFT
 from creeping.field.currents.conductor import amplitudes, ray_scalars, spread_of, turn_of, vectors_of
 from creeping.field.marching.fan_rays import FLAT
 from creeping.field.marching.fan_waves import FanWaves, fan_waves, marches, spread_out
-from creeping.field.ray_sums import RaySum
-from creeping.field.shed_wave import smoothstep
-from creeping.field.strip_waves import StripTable, resampled, without_tubes
+from creeping.field.waves.beams import STRONG, beams_beside_rays, blended_sum, variation
+from creeping.field.waves.ray_sums import RaySum
+from creeping.field.waves.shed_wave import smoothstep
+from creeping.field.waves.strip_waves import StripTable, resampled, without_tubes
 from creeping.geometry.quadrature import BodyNodes, nodes_at
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan

@@ -12,9 +12,9 @@ Also here: e and H of the creeping rays whose tangents pass through points off a
     E = e v b,                             H = e v n         electric soft
 
 p, n and b = n x p are those where the ray leaves, h = H0.b and e = E0.b those where it has landed, u and v the waves of
-`creeping.field.near_wave`, T = J + l J' the width of the ray's tube. A ray carries b onto b and n onto n; what h varies
-by across rays gives H along them, (i/k) dh/db, as in the current on the body. E and H along rays that come from what u
-and v vary by along n, of the order m/(k l) at the distance l, are left out; the error counts them.
+`creeping.field.waves.near_wave`, T = J + l J' the width of the ray's tube. A ray carries b onto b and n onto n; what h
+varies by across rays gives H along them, (i/k) dh/db, as in the current on the body. E and H along rays that come from
+what u and v vary by along n, of the order m/(k l) at the distance l, are left out; the error counts them.
 
 Sources: [CK13, sec. 6.2]; [LK59], [PBM80]; Derivations, F18, F20, F26, F8 and F14.
 """
@@ -33,19 +33,19 @@ from creeping.field.body_currents import affordable, cached_currents, solved_cur
 from creeping.field.boundary import CONDUCTOR, ELECTRIC_HARD, ELECTRIC_SOFT
 from creeping.field.conductor.layer import incident_fields, layer_fields, lowest_height, total_fields
 from creeping.field.conductor.on_body import OnConductor, on_conductor
-from creeping.field.conductor_result import ConductorCurrent, ConductorField, Fields, by_polarisation
 from creeping.field.currents.conductor import ConductorCurrents, amplitudes
 from creeping.field.currents.whole_body import POINTS as INNER
 from creeping.field.currents.whole_body import far_enough
 from creeping.field.equation.currents import ConductorTileCurrents
-from creeping.field.far_geometry import fan_strips
-from creeping.field.far_result import incident_mix, spherical_frame
 from creeping.field.lit_ground import LEFT, UNKNOWN, convex
 from creeping.field.near import MISSING, ON_BODY, checked_height, rays_alone
-from creeping.field.near_wave import height_above, shed_waves
-from creeping.field.point_result import FieldStatus, PointValues, judged, measured_field, zero_field
-from creeping.field.ray_sums import RaySum, own_error, ray_sum
+from creeping.field.results.conductor_result import ConductorCurrent, ConductorField, Fields, by_polarisation
+from creeping.field.results.far_result import incident_mix, spherical_frame
+from creeping.field.results.point_result import FieldStatus, PointValues, judged, measured_field, zero_field
 from creeping.field.validity_range import validity
+from creeping.field.waves.far_geometry import fan_strips
+from creeping.field.waves.near_wave import height_above, shed_waves
+from creeping.field.waves.ray_sums import RaySum, own_error, ray_sum
 from creeping.geodesics.bundle import as_points, on_body
 from creeping.geometry.arguments import one_of
 from creeping.geometry.checks import unit_of

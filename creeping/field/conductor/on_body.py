@@ -29,11 +29,11 @@ from creeping.field.conductor.marched import current_marches, marched_current
 from creeping.field.currents.conductor import ConductorCurrents, lit_vectors, ray_vectors
 from creeping.field.currents.nodes import TAKEN_OVER, axes_of_incidence, lit_part
 from creeping.field.equation.currents import ON_BODY, ConductorTileCurrents, along_body
-from creeping.field.far_geometry import fan_strips
 from creeping.field.lit_ground import composed, convex, lit_error
-from creeping.field.point_result import PointValues, Words, measured_field
-from creeping.field.ray_sums import RaySum, own_error, ray_sum, total_of
-from creeping.field.surface import surface_waves
+from creeping.field.results.point_result import PointValues, Words, measured_field
+from creeping.field.waves.far_geometry import fan_strips
+from creeping.field.waves.ray_sums import RaySum, own_error, ray_sum, total_of
+from creeping.field.waves.surface import surface_waves
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.quadrature import nodes_at
 from creeping.geometry.surface import Surface, normal, project, size

@@ -32,9 +32,9 @@ from creeping.field.currents.radiation import (
     magnetic_field_of_vector,
 )
 from creeping.field.currents.whole_body import SurfaceCurrents
-from creeping.field.far_result import spherical_frame
+from creeping.field.results.far_result import spherical_frame
 from creeping.field.special.fock import surface_function
-from creeping.field.surface import ray_factor, surface_waves
+from creeping.field.waves.surface import ray_factor, surface_waves
 from creeping.rays.quantities import RayPoints
 
 

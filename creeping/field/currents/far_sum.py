@@ -9,7 +9,7 @@ from creeping._typing import Any, FloatArray
 from creeping.field.arguments import UNRESOLVED
 from creeping.field.boundary import BoundaryLike, boundary_name
 from creeping.field.currents.whole_body import SurfaceCurrents
-from creeping.field.far_result import FarField
+from creeping.field.results.far_result import FarField
 from creeping.geometry.checks import unit_of
 from creeping.storage.parts import Keeping, not_kept
 

@@ -22,11 +22,11 @@ r = kappa_b/kappa_a, T = (t rho)^2 and an admittance eta (0 hard), all times e^{
 e is 1, of a conductor's polarisations -1 (`creeping.field.currents.lit`). g(xi; q) is Fock's function, D^n g
 it with t^n under its integral, g_q = dg/dq. Optics is the series of Luneburg and Kline on the boundary: with psi the
 reflected eikonal, Lap psi = 2 kappa_a/c + 2 c kappa_b there. Fock's current is that of the shadow
-(`creeping.field.surface`) with the arclength behind the line replaced by c, and its |J|^(-1/2) by 1 + r xi^2/(4m^2). E
-and D must then fall off towards the light, where D/m^2 becomes the term of optics in kappa_b, which gives the factors
-of Dg and g_q that the shadow leaves open; the term in T is what the circular cylinder asks for, met obliquely. G is
-what the layer under an admittance that varies remembers of what it has passed. So it holds wherever kappa_a > 0; optics
-alone stands elsewhere. Of an impedance the terms in rho'', rho'^2 and T are left out.
+(`creeping.field.waves.surface`) with the arclength behind the line replaced by c, and its |J|^(-1/2) by 1 + r
+xi^2/(4m^2). E and D must then fall off towards the light, where D/m^2 becomes the term of optics in kappa_b, which
+gives the factors of Dg and g_q that the shadow leaves open; the term in T is what the circular cylinder asks for, met
+obliquely. G is what the layer under an admittance that varies remembers of what it has passed. So it holds wherever
+kappa_a > 0; optics alone stands elsewhere. Of an impedance the terms in rho'', rho'^2 and T are left out.
 
 Also here: currents J = n x H of a plane wave on the lit side of a perfect conductor, uniform up to the shadow line.
 
@@ -55,9 +55,9 @@ import numpy as np
 from creeping._typing import ComplexArray, FloatArray
 from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT, Boundary
 from creeping.field.creeping_modes import fock_scale
-from creeping.field.reflected import plane_reflection
-from creeping.field.shed_wave import limited, smoothstep
 from creeping.field.special.fock import surface_function, surface_slope
+from creeping.field.waves.reflected import plane_reflection
+from creeping.field.waves.shed_wave import limited, smoothstep
 
 OPTICS = (4.0, 8.0)
 """-xi over which Fock's current gives way to optics."""

@@ -27,8 +27,8 @@ from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale, slowest_decay
 from creeping.field.currents.lit import lit_currents
 from creeping.field.marching.fan_waves import fan_waves, march_alone, marchable, spread_out
-from creeping.field.shed_wave import smoothstep
-from creeping.field.surface import surface_waves
+from creeping.field.waves.shed_wave import smoothstep
+from creeping.field.waves.surface import surface_waves
 from creeping.geometry.piecewise import is_piecewise, piece_ahead, pieces_of
 from creeping.geometry.quadrature import BodyNodes, body_nodes, nearest_points, nodes_at
 from creeping.geometry.surface import Surface, normal, size

@@ -18,7 +18,6 @@ from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import observers_of
 from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
-from creeping.field.conductor_result import ConductorCurrent, ConductorField, Fields, by_polarisation
 from creeping.field.currents.far_sum import far_by_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation.columns import solved_columns
@@ -26,9 +25,10 @@ from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
 from creeping.field.equation.effort import FULL, Effort
 from creeping.field.equation.matrix import Matrix
 from creeping.field.equation.tiles import Tiles
-from creeping.field.far_result import FarField, incident_mix, spherical_frame
-from creeping.field.point_result import FieldStatus, NearField, SurfaceField, judged
-from creeping.field.reflected import plane_reflection
+from creeping.field.results.conductor_result import ConductorCurrent, ConductorField, Fields, by_polarisation
+from creeping.field.results.far_result import FarField, incident_mix, spherical_frame
+from creeping.field.results.point_result import FieldStatus, NearField, SurfaceField, judged
+from creeping.field.waves.reflected import plane_reflection
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.checks import unit_of
 from creeping.geometry.parts import inside as inside_of

@@ -7,7 +7,8 @@ tangent (cos psi, sin psi), normal (sin psi, -cos psi) and the wave along the fi
 
 Between two nodes kappa is the cubic through four nodes of the same piece; nodes that stand twice part the pieces.
 
-Also here: compiled twin of `creeping.field.shed_wave.mode_sum` for constant modes and plane waves: both orders at once.
+Also here: compiled twin of `creeping.field.waves.shed_wave.mode_sum` for constant modes and plane waves: both orders at
+once.
 
     P_1 e^{-iπ/4} = 2i√π Σ_p R_p e^{iξτ_p},   P_2 e^{-iπ/4} = 2i√π Σ_p R_p A_p e^{i(ξτ_p + δ_p)}
     δ = (2/k)^(1/3) (c_0 I_2 + c_r I_3 + c_v I_4) + a (ρ2'/m2 - ρ1'/m1)/12,   held below ξ|τ|/2

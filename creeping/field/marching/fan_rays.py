@@ -31,9 +31,9 @@ from scipy.interpolate import CubicHermiteSpline
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.field.arguments import checked_plain
 from creeping.field.boundary import HARD, Boundary
-from creeping.field.far_geometry import fan_strips
 from creeping.field.marching.profile import LEAST_NODES, RayProfiles
-from creeping.field.shed_wave import smoothstep
+from creeping.field.waves.far_geometry import fan_strips
+from creeping.field.waves.shed_wave import smoothstep
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.own_times import trace_own
 from creeping.geodesics.pieces import trace_pieces

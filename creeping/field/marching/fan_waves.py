@@ -10,7 +10,7 @@ decayed below what the top of its layer lets through. k_c is the wavenumber that
 Also here: the waves of a whole fan at points of the body, by marching: rays that pass through, and beams where those
 merge.
 
-Both go together as `creeping.field.beams` says.
+Both go together as `creeping.field.waves.beams` says.
 
 Sources: [P82]; Derivations, F22 and F24.
 """
@@ -24,14 +24,14 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import RectBivariateSpline
 
 from creeping._typing import BoolArray, ComplexArray, FloatArray, IntArray
-from creeping.field.beams import MOST_TURNED, STRONG, beams_beside_rays, blended_sum, variation
 from creeping.field.boundary import Boundary
-from creeping.field.far_geometry import fan_strips
 from creeping.field.marching.fan_rays import FLAT, fan_profiles, wide_rows
 from creeping.field.marching.layer import MarchedRays, march_rays
 from creeping.field.marching.plan import MarchStatus
-from creeping.field.ray_sums import RaySum
-from creeping.field.strip_waves import StripTable, around, modes_on_strip
+from creeping.field.waves.beams import MOST_TURNED, STRONG, beams_beside_rays, blended_sum, variation
+from creeping.field.waves.far_geometry import fan_strips
+from creeping.field.waves.ray_sums import RaySum
+from creeping.field.waves.strip_waves import StripTable, around, modes_on_strip
 from creeping.geometry.piecewise import has_edges, is_piecewise
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan
@@ -227,7 +227,7 @@ def fan_waves(fan: RayFan, *, wavenumber: float, boundary: Boundary) -> FanWaves
 
 def marches(fan: RayFan, boundary: Boundary, order: int, count: int, wavenumber: float) -> bool:
     """Whether the waves of a fan can be marched, and cost little enough at ``count`` points."""
-    from creeping.field.beams import seconds
+    from creeping.field.waves.beams import seconds
 
     return marchable(fan, boundary, order) and seconds(fan, fan_strips(fan), wavenumber, count) < LONGEST
 

@@ -56,8 +56,8 @@ from creeping._typing import Any, ComplexArray, FloatArray, IntArray
 from creeping.field.ports.beams import PortBeams
 from creeping.field.ports.sources import PortSources, Sums, path_error
 from creeping.field.ports.waves import LIMIT, PathTerms, path_terms, second_order
-from creeping.field.shed_wave import limited
 from creeping.field.special.airy import coupling_function, hard_modes, soft_coupling_function, soft_modes
+from creeping.field.waves.shed_wave import limited
 from creeping.geometry.surface import Surface
 from creeping.rays.port_rays import PortRays
 

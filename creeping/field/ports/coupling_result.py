@@ -21,10 +21,10 @@ from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import BoundaryLike, boundary_name, scalar_boundaries
-from creeping.field.labelled import ArrayResult, power
-from creeping.field.point_result import FieldStatus, Words
 from creeping.field.ports.sources import PortSources, point_sources
 from creeping.field.ports.sums import PortSums, port_sums
+from creeping.field.results.labelled import ArrayResult, power
+from creeping.field.results.point_result import FieldStatus, Words
 from creeping.field.special.airy import hard_modes
 from creeping.geodesics.bundle import as_points, on_body
 from creeping.geodesics.equations import points_of_charts

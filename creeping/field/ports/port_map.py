@@ -18,11 +18,11 @@ import numpy as np
 from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import BoundaryLike, boundary_name
-from creeping.field.labelled import power
-from creeping.field.point_result import FieldStatus, PointField, point_dataset
 from creeping.field.ports.coupling_result import CLOSEST, checked_wave, fan_length, merging_pad
 from creeping.field.ports.sources import point_sources
 from creeping.field.ports.sums import port_sums
+from creeping.field.results.labelled import power
+from creeping.field.results.point_result import FieldStatus, PointField, point_dataset
 from creeping.geodesics.bundle import as_points, on_body
 from creeping.geometry.checks import unit_of
 from creeping.geometry.surface import Surface, size

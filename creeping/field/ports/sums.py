@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import BoolArray, ComplexArray, FloatArray, IntArray
-from creeping.field.point_result import FieldStatus, Words
 from creeping.field.ports.beams import beam_width
 from creeping.field.ports.sources import PortSources
-from creeping.field.ray_sums import LOST, MERGING, NARROW
+from creeping.field.results.point_result import FieldStatus, Words
 from creeping.field.special.airy import hard_modes
+from creeping.field.waves.ray_sums import LOST, MERGING, NARROW
 from creeping.geometry.surface import size
 from creeping.rays.port_rays import PortRays
 from creeping.rays.reach import SPARED

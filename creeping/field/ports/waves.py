@@ -27,8 +27,8 @@ import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.field.creeping_modes import fock_scale
-from creeping.field.shed_wave import SECOND_ORDER, limited, smoothstep
 from creeping.field.special.airy import MODES, coupling_function, hard_modes
+from creeping.field.waves.shed_wave import SECOND_ORDER, limited, smoothstep
 from creeping.rays.port_rays import PortRays
 
 LIMIT = 0.5

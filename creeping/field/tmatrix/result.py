@@ -22,7 +22,7 @@ import numpy as np
 from creeping._typing import ArrayLike, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import UNRESOLVED, observers_of
-from creeping.field.far_result import FarField
+from creeping.field.results.far_result import FarField
 from creeping.field.tmatrix.lack import Lack
 from creeping.field.tmatrix.patterns import (
     Averages,

@@ -208,7 +208,7 @@ def far_vectors(directions: FloatArray, order: int) -> ComplexArray:
 
     X_lm of M and i r cross X_lm of N, whose degrees' factors (-i)^(l+1) are left out.
     """
-    from creeping.field.far_result import spherical_frame
+    from creeping.field.results.far_result import spherical_frame
 
     frame = spherical_frame(directions)
     deg, _ = degrees(order)

@@ -113,7 +113,7 @@ def test_far_shadow_by_rays(mie):
 
 
 def spherical(i):
-    from creeping.field.far_result import spherical_frame
+    from creeping.field.results.far_result import spherical_frame
 
     return spherical_frame(OBLIQUE)[i][:, None].astype(complex)
 

@@ -9,7 +9,7 @@ import creeping as cr
 from creeping.errors import InvalidInputError
 from creeping.field.conductor.on_body import crosses
 from creeping.field.equation import effort
-from creeping.field.far_result import spherical_frame
+from creeping.field.results.far_result import spherical_frame
 from creeping.geometry.quadrature import body_nodes
 
 OBLIQUE = np.array([0.36, 0.48, 0.8])

@@ -5,7 +5,7 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.field.far_result import dyads
+from creeping.field.results.far_result import dyads
 from tests.reference import clouds, dipoles, sphere
 
 OBLIQUE = np.array([0.36, 0.48, 0.8])
@@ -70,7 +70,7 @@ def test_near_the_far_zone_and_inside(rng):
     currents = cr.surface_currents(fan_of(sc.Ellipsoid(1.0, 0.8, 0.6), OBLIQUE), wavenumber=k, boundary="pec")
     assert currents.scattered(2 * r).shape == (5, 3, 2)
     # H ~ r x f e^{ikR}/R
-    from creeping.field.far_result import spherical_frame
+    from creeping.field.results.far_result import spherical_frame
 
     R = 1e5
     f = np.einsum("moc,moi->mci", spherical_frame(r), currents.far(r))

@@ -10,7 +10,7 @@ from creeping.errors import InvalidInputError
 from creeping.field.body_currents import cached_currents
 from creeping.field.equation.currents import ON_BODY
 from creeping.field.equation.solving import asked_solution
-from creeping.field.far_result import incident_mix
+from creeping.field.results.far_result import incident_mix
 from tests.reference.sphere import pec_far_field, pec_total_field
 
 D = np.array([0.48, 0.6, -0.64])

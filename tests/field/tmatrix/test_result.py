@@ -7,7 +7,7 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.field.far_result import spherical_frame
+from creeping.field.results.far_result import spherical_frame
 
 RNG = np.random.default_rng(4)
 D, R = RNG.normal(size=(2, 6, 3))

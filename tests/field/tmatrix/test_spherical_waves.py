@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from creeping.field.far_result import spherical_frame
+from creeping.field.results.far_result import spherical_frame
 from creeping.field.tmatrix.spherical_waves import (
     combined,
     degrees,

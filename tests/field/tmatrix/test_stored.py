@@ -7,7 +7,7 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.field.far_result import spherical_frame
+from creeping.field.results.far_result import spherical_frame
 
 h5py = pytest.importorskip("h5py")
 CLUSTER = Path(__file__).parent / "treams_cluster.tmat.h5"

@@ -1,6 +1,6 @@
 """What a field at points is: complex values with their error, and what is the matter where they are not to be trusted.
 
-Results act as arrays of their values (`creeping.field.labelled`).
+Results act as arrays of their values (`creeping.field.results.labelled`).
 
 Also here: what serves at points: a field in two parts with its error, and the rule by which another takes its place.
 
@@ -18,7 +18,7 @@ import numpy as np
 
 from creeping._presenting import Shown
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
-from creeping.field.labelled import COMPONENTS, ArrayResult, power
+from creeping.field.results.labelled import COMPONENTS, ArrayResult, power
 from creeping.field.validity_range import Validity
 from creeping.storage.memory import required
 
@@ -277,7 +277,7 @@ class PointValues:
     error : (n,)
     error_by, method : (n,) of str
     status : (n,) of int
-        As of `creeping.field.point_result.PointField`, but for what `judged` says of a whole field.
+        As of `creeping.field.results.point_result.PointField`, but for what `judged` says of a whole field.
     """
 
     wave: ComplexArray

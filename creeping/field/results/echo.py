@@ -17,9 +17,9 @@ import numpy as np
 from creeping._presenting import Drawn
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.comparison import cross_section_decibels, decibels
 from creeping.field.frequency import frequency
-from creeping.field.labelled import power
+from creeping.field.results.comparison import cross_section_decibels, decibels
+from creeping.field.results.labelled import power
 from creeping.storage.memory import required
 
 if TYPE_CHECKING:

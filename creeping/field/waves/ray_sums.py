@@ -34,10 +34,10 @@ from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.arguments import fock_parameter, scales, transverse_ratios
 from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT, Boundary
 from creeping.field.creeping_modes import fock_scale, slowest_decay
-from creeping.field.far_geometry import fan_strips
-from creeping.field.near_wave import first_order_share
-from creeping.field.point_result import FieldStatus
-from creeping.field.source_waves import left_out
+from creeping.field.results.point_result import FieldStatus
+from creeping.field.waves.far_geometry import fan_strips
+from creeping.field.waves.near_wave import first_order_share
+from creeping.field.waves.source_waves import left_out
 from creeping.rays.fan import RayFan
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays

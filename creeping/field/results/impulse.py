@@ -30,7 +30,7 @@ from creeping._presenting import Drawn
 from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.frequency import band_sum
-from creeping.field.labelled import ArrayResult
+from creeping.field.results.labelled import ArrayResult
 from creeping.geometry.arguments import number_between, positive_number
 
 

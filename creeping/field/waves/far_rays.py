@@ -4,13 +4,13 @@
 
 with θ the angle from d, m̄ the mean of m over the shadow line and W a smooth step,
 
-    w = 1 - W(m̄ θ; 0.55, 0.85)                  F the forward lobe (`creeping.field.forward`)
+    w = 1 - W(m̄ θ; 0.55, 0.85)                  F the forward lobe (`creeping.field.waves.forward`)
     v = W(min χ; 0.38, 0.52) for θ > 90°      χ = |J|/(|J| + ρ|J'|) over crossings of the horizon with p.r > 0.9
     f_rays = Σ -√(m1 m2) √(2/k) P |J'|^(-1/2) e^{-iπN/2} e^{ik(d.x0 + s - r.x)}   all rays with p = r
 
-Its error adds in squares what is left out (`creeping.field.likely_cells`, `creeping.field.far_geometry`) and what is
-beyond the second order of each ray, 3 |f2 - f1|^2/|f2|, of a specular point 3 T^2 |f| (`creeping.field.reflected`), of
-the forward lobe 2 |f2 - f1| and 0.1 |F|/m̄^4.
+Its error adds in squares what is left out (`creeping.field.waves.likely_cells`, `creeping.field.waves.far_geometry`)
+and what is beyond the second order of each ray, 3 |f2 - f1|^2/|f2|, of a specular point 3 T^2 |f|
+(`creeping.field.waves.reflected`), of the forward lobe 2 |f2 - f1| and 0.1 |F|/m̄^4.
 
 Sources: [LK59], [P79]; Derivations, F3, F10, F13 to F15. The thresholds of W and these factors were set by trial.
 """
@@ -20,18 +20,18 @@ import numpy as np
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.arguments import scales
 from creeping.field.boundary import Boundary, BoundaryLike, boundary_name, scalar_boundaries
-from creeping.field.far_geometry import FarGeometry, merging, off_axis
-from creeping.field.far_result import FarField, dyads, wave_frame
-from creeping.field.forward import fan_half, lit_half, shadow_half, silhouette
-from creeping.field.ray_sums import CROSSED, gradient_coupling, held_coupling, strong_coupling, turning
-from creeping.field.reflected import (
+from creeping.field.results.far_result import FarField, dyads, wave_frame
+from creeping.field.waves.far_geometry import FarGeometry, merging, off_axis
+from creeping.field.waves.forward import fan_half, lit_half, shadow_half, silhouette
+from creeping.field.waves.ray_sums import CROSSED, gradient_coupling, held_coupling, strong_coupling, turning
+from creeping.field.waves.reflected import (
     NORMAL,
     polarisation_terms,
     reflected_amplitude,
     reflected_error,
     series_fails,
 )
-from creeping.field.shed_wave import shed_orders, smoothstep
+from creeping.field.waves.shed_wave import shed_orders, smoothstep
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays
 from creeping.rays.specular import SpecularPoints

@@ -2,10 +2,10 @@
 
     f = (1 - w) f_rays + Σ over smooth parts of [u f_optics + (1 - u) f_specular]
 
-with w of the forward lobe as in `creeping.field.far_rays`. A smooth part is what hangs together by joints; u is 1, but
-w where the part has specular points and all stand clear of its creases (`creeping.rays.specular`). f_optics
-(`creeping.field.piecewise_far`) holds facets, specular points next to edges, and the forward lobe. The error adds in
-squares, besides what is beyond the second order of each ray and specular point,
+with w of the forward lobe as in `creeping.field.waves.far_rays`. A smooth part is what hangs together by joints; u is
+1, but w where the part has specular points and all stand clear of its creases (`creeping.rays.specular`). f_optics
+(`creeping.field.waves.piecewise_far`) holds facets, specular points next to edges, and the forward lobe. The error adds
+in squares, besides what is beyond the second order of each ray and specular point,
 
     edges      C/(2π) |∫ e^{ik(d - r).x} dl|        lit or part of the outline, and their parts, C of order 1
     line       1/(2π) |∫ min[κ/(k (1 - d.r)²), (kρ)^(1/3)] e^{ik(d - r).x} dl|, of a conductor |d x r|/(1 - d.r) more
@@ -47,13 +47,13 @@ import numpy as np
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import SOFT, Boundary, BoundaryLike, boundary_name, scalar_boundaries
 from creeping.field.creeping_modes import fock_scale, modes_of
-from creeping.field.far_geometry import FarGeometry, far_geometry, merging
-from creeping.field.far_rays import FORWARD, MERGED, UNSURE, Parts, beyond, isolated_rays, passed_fold
-from creeping.field.far_result import FarField, spherical_frame
-from creeping.field.likely_cells import parted
-from creeping.field.ray_sums import strong_coupling
-from creeping.field.reflected import plane_reflection
-from creeping.field.shed_wave import smoothstep
+from creeping.field.results.far_result import FarField, spherical_frame
+from creeping.field.waves.far_geometry import FarGeometry, far_geometry, merging
+from creeping.field.waves.far_rays import FORWARD, MERGED, UNSURE, Parts, beyond, isolated_rays, passed_fold
+from creeping.field.waves.likely_cells import parted
+from creeping.field.waves.ray_sums import strong_coupling
+from creeping.field.waves.reflected import plane_reflection
+from creeping.field.waves.shed_wave import smoothstep
 from creeping.geometry.curvature import curvature_norms
 from creeping.geometry.memo import memo
 from creeping.geometry.piecewise import Tiles, is_convex, pieces_of, tiles_of

@@ -30,8 +30,8 @@ import numpy as np
 from creeping._typing import BoolArray, ComplexArray, FloatArray
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale
-from creeping.field.shed_wave import limited, smoothstep
 from creeping.field.special.fock import FARTHEST, pekeris, pekeris_slope
+from creeping.field.waves.shed_wave import limited, smoothstep
 from creeping.rays.specular import SpecularPoints
 
 NORMAL = (0.0, 0.2)

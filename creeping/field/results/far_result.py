@@ -23,8 +23,8 @@ import numpy as np
 
 from creeping._presenting import Drawn
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
-from creeping.field.comparison import cross_section_decibels, decibels
-from creeping.field.labelled import COMPONENTS, directed, power
+from creeping.field.results.comparison import cross_section_decibels, decibels
+from creeping.field.results.labelled import COMPONENTS, directed, power
 from creeping.field.validity_range import Validity, validity_numbers
 
 if TYPE_CHECKING:
@@ -70,8 +70,8 @@ class FarField(Drawn):
         namely at a caustic of creeping rays that the fan integral does not cover, at a caustic of the reflected field
         (a specular point on a nearly flat region), or in a forward lobe without bisector contour (a concave region)
         or whose rim the body hides in part; if rays that end too early may lack as much
-        (`creeping.field.likely_cells`); or if k times the radius of curvature is below 4 and the error exceeds half
-        the sum of all contributions. Currents: True if the error exceeds a tenth of the largest |f|.
+        (`creeping.field.waves.likely_cells`); or if k times the radius of curvature is below 4 and the error exceeds
+        half the sum of all contributions. Currents: True if the error exceeds a tenth of the largest |f|.
     error : (m,) or (m, 2, 2), L
         Error of |f|. It covers 95 % of directions; NaN where it is not known.
     error_by : str

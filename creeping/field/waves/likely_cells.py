@@ -33,7 +33,7 @@ from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.field.arguments import scales
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale, modes_of
-from creeping.field.shed_wave import shed_wave
+from creeping.field.waves.shed_wave import shed_wave
 from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.states import M11, P, X
 from creeping.geometry.piecewise import tips_of

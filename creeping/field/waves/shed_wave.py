@@ -11,8 +11,8 @@ geometric mean of both ends.
 Also here: the wave that rays shed in both orders at once: what the far field asks of each, at every frequency and
 boundary.
 
-Beyond the passage to the series of `creeping.field.shed_wave` a compiled sum over modes serves, beyond SERIES alone;
-before, and for modes that differ from ray to ray or a point source, that module itself.
+Beyond the passage to the series of `creeping.field.waves.shed_wave` a compiled sum over modes serves, beyond SERIES
+alone; before, and for modes that differ from ray to ray or a point source, that module itself.
 
 Sources: Derivations, F4 to F7.
 """
@@ -25,9 +25,9 @@ from creeping._typing import ComplexArray, FloatArray
 from creeping.field.arguments import fock_parameter, mean_scale, scales, transverse_ratios
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import BETA, decay_slopes, decay_terms, modes_of
-from creeping.field.source_waves import of_source
 from creeping.field.special.airy import MODES, Modes
 from creeping.field.special.fock import SERIES, pekeris_slope, pekeris_star, pole
+from creeping.field.waves.source_waves import of_source
 from creeping.kernels.threads import in_slices
 from creeping.rays.quantities import RayPoints
 

@@ -19,10 +19,10 @@ from creeping._typing import BoolArray, ComplexArray, FloatArray
 from creeping.field.arguments import fock_parameter, mean_scale, scales
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import modes_of
-from creeping.field.shed_wave import amplitude_factor, end_residue, mode_waves, smoothstep
 from creeping.field.special.airy import MODES
 from creeping.field.special.fock import FAR_HEIGHT, height_gain, near_pekeris, pekeris_star, transition_rate
-from creeping.field.surface import surface_amplitude
+from creeping.field.waves.shed_wave import amplitude_factor, end_residue, mode_waves, smoothstep
+from creeping.field.waves.surface import surface_amplitude
 from creeping.rays.quantities import RayPoints
 
 SERIES = (0.5, 0.9)

@@ -19,8 +19,8 @@ from creeping._typing import ComplexArray, FloatArray
 from creeping.field.arguments import checked, fock_parameter, scales
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale
-from creeping.field.shed_wave import SECOND_ORDER, shared_pole, shed_orders, shed_wave, smoothstep
 from creeping.field.special.fock import pekeris_slope, pekeris_star
+from creeping.field.waves.shed_wave import SECOND_ORDER, shared_pole, shed_orders, shed_wave, smoothstep
 from creeping.geometry.surface import Surface
 from creeping.rays.observer_contour import HorizonRays, MidHorizon
 from creeping.shadow.attachment import line_tangents

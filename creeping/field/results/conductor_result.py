@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from creeping._typing import Any, ComplexArray, FloatArray
-from creeping.field.labelled import ArrayResult
-from creeping.field.point_result import PointData
+from creeping.field.results.labelled import ArrayResult
+from creeping.field.results.point_result import PointData
 
 if TYPE_CHECKING:
     import xarray
@@ -99,7 +99,7 @@ class ConductorField(PointData):
 
     def to_xarray(self) -> xarray.Dataset:
         """``xarray.Dataset`` of E, H, their parts, error and status, by point, component and polarisation."""
-        from creeping.field.point_result import vector_dataset
+        from creeping.field.results.point_result import vector_dataset
 
         parts = {f"{letter}_{name}": getattr(getattr(self, name), letter) for name in PARTS for letter in "EH"}
         return vector_dataset(self, {"E": self.E, "H": self.H, **parts})
@@ -162,7 +162,7 @@ class ConductorCurrent(ArrayResult, PointData):
 
     def to_xarray(self) -> xarray.Dataset:
         """``xarray.Dataset`` of J, its parts, charge, error and status, by point and component."""
-        from creeping.field.point_result import vector_dataset
+        from creeping.field.results.point_result import vector_dataset
 
         parts = {"J": self.values, "charge": self.charge, "lit": self.lit, "creeping": self.creeping}
         return vector_dataset(self, parts | {"charge_error": self.charge_error})

@@ -26,7 +26,7 @@ from scipy.special import airy
 
 from creeping._typing import Any, ArrayLike, BoolArray, FloatArray, IntArray
 from creeping.field.arguments import observers_of
-from creeping.field.likely_cells import RayEnds, likely_found
+from creeping.field.waves.likely_cells import RayEnds, likely_found
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.states import END, WITH_END, WITH_JACOBI
 from creeping.geometry.curvature import ParabolicPoints, parabolic_points

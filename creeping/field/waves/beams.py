@@ -17,7 +17,7 @@ Also here: rays that pass through points of the body, and beams where those merg
     u = (u_r e_b^2 + u_b e_r^2)/(e_r^2 + e_b^2)
 
 u_r is the sum over the rays through the point, u_b that of beams. Both have the error of the wave itself; the rest of
-it is, for rays that merge, e_r as of `creeping.field.ray_sums`; for beams
+it is, for rays that merge, e_r as of `creeping.field.waves.ray_sums`; for beams
 
     e_b^2 = sum min(|u_i|, 1.5 |y_i|)^2 (A + B eta)^2 + A^2 |u_b|^2 + C^2 |u_b - u_b'|^2
     eta = |d(log y)/dsigma_perp|^2/(2 k eps)
@@ -39,9 +39,9 @@ from scipy.integrate import cumulative_trapezoid
 from creeping._typing import BoolArray, ComplexArray, FloatArray
 from creeping.field.arguments import fock_parameter
 from creeping.field.boundary import Boundary
-from creeping.field.far_geometry import fan_strips
-from creeping.field.point_result import FieldStatus
-from creeping.field.ray_sums import (
+from creeping.field.results.point_result import FieldStatus
+from creeping.field.waves.far_geometry import fan_strips
+from creeping.field.waves.ray_sums import (
     FADED,
     LOST,
     RaySum,
@@ -51,7 +51,7 @@ from creeping.field.ray_sums import (
     merging_error,
     total_of,
 )
-from creeping.field.shed_wave import smoothstep
+from creeping.field.waves.shed_wave import smoothstep
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.pieces import trace_pieces
 from creeping.geodesics.states import M11, M12, M21, M22, P, X, pack

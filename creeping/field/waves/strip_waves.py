@@ -23,10 +23,10 @@ from scipy.interpolate import RectBivariateSpline, make_interp_spline
 
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
-from creeping.field.far_geometry import FarGeometry
-from creeping.field.far_rays import Parts
-from creeping.field.ray_sums import own_error
-from creeping.field.surface import surface_waves
+from creeping.field.waves.far_geometry import FarGeometry
+from creeping.field.waves.far_rays import Parts
+from creeping.field.waves.ray_sums import own_error
+from creeping.field.waves.surface import surface_waves
 from creeping.geometry.surface import size
 from creeping.rays.quantities import RayPoints
 from creeping.rays.strips import Strip

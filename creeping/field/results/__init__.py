@@ -1,0 +1,1 @@
+"""What fields, echoes and responses are: complex values with their errors, statuses and labels."""

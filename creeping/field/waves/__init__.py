@@ -1,0 +1,1 @@
+"""Waves of creeping rays: on the body, near it and far from it, one by one, summed, and as beams."""
