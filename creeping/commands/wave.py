@@ -47,7 +47,7 @@ def asked_wavenumber(
     try:
         found = wavenumber_of(value, sound_speed=sound_speed)
         if not isinstance(found, float):
-            raise InvalidInputError(f"{value!r} is a range; `creeping rcs` and `creeping ts` take those")
+            raise InvalidInputError(f"{value!r} is a range; `creeping rcs`, `ts` and `coupling` take those")
         hertz = float(hertz_of(found, sound_speed=sound_speed))
         return checked(found, 2), hertz, cure_of(option, value, hertz)
     except InvalidInputError as error:

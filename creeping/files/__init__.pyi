@@ -9,8 +9,10 @@ from .polylines import polydata as polydata
 from .spectra import write_sofa as write_sofa
 from .spectra import write_stk as write_stk
 from .spectra import write_touchstone as write_touchstone
+from .tables import write_couplings as write_couplings
 from .tables import write_csv as write_csv
 from .tables import write_echo as write_echo
+from .tables import write_paths as write_paths
 from .tables import write_profile as write_profile
 from .tables import write_text as write_text
 from .tables import write_vtp as write_vtp

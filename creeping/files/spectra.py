@@ -6,7 +6,13 @@ Touchstone, for programs that read N-port data:
 
 the field at port i of a source at port j, in units of what that source gives at a distance r0 along a hard plane, that
 is 1/(2 pi r0). It is written as S_ij: a transfer ratio without unit, not a scattering parameter: nothing is known
-of what ports reflect, S_ii is 0, and columns are not bounded by 1. Numbers are conjugated, for e^{+jwt}.
+of what ports reflect, S_ii is 0, and columns are not bounded by 1. On a conductor
+
+    Z_ij = -Z_0 l^2 E_ij     monopoles of height l, ohm
+    Y_ij = l^2 H_ij/Z_0      slots of length l, siemens
+
+with E and H those of `creeping.monopole_coupling` and `creeping.slot_coupling`; Z_ii and Y_ii are not known, and 0.
+Numbers are conjugated, for e^{+jwt}.
 
 SOFA (AES69), head-related transfer functions for programs that render sound or analyse arrays:
 
@@ -49,6 +55,8 @@ if TYPE_CHECKING:
     from creeping.field.results.echo import Echo
 
 HRTF, GENERAL = "SimpleFreeFieldHRTF", "GeneralTF"
+IMPEDANCE = 376.730313668
+"""Z_0, impedance of free space, ohm [CODATA 2018]."""
 DISTANCE = 1.0
 """What a SOFA file says of how far sources are, m: it has no word for far fields."""
 
@@ -86,8 +94,11 @@ def write_touchstone(
     *,
     reference_distance: float,
     sound_speed: float | None = None,
+    names: Sequence[str] = (),
 ) -> None:
     """Write couplings of the same ports at ascending wavenumbers as Touchstone, version 1.
+
+    Point sources on a hard body give S parameters, monopoles Z and slots Y parameters, none of them a diagonal.
 
     Parameters
     ----------
@@ -96,40 +107,47 @@ def write_touchstone(
     couplings : sequence of Coupling
         One for each wavenumber.
     reference_distance : float, L
-        r0 of the transfer ratio.
+        r0 of the transfer ratio; of monopoles their height, of slots their length.
     sound_speed : float, optional, m/s
         For the frequency of a wavenumber; that of light if not given.
+    names : sequence of str
+        Of the ports, for comments.
 
     Raises
     ------
     InvalidInputError
-        If couplings are of slots or monopoles or both, of different ports or not in order.
+        If couplings are of slots and monopoles together, of different ports or not in order.
     CreepingError
         If the file cannot be written.
     """
     unit = positive_number(reference_distance, "reference_distance")
     given = over_frequency(couplings, Coupling, "couplings", "coupling", ("ports",))
-    electric = [n for n, one in enumerate(given) if one.boundary == "pec"]
-    if electric:
+    kinds = sorted({str(kind) for one in given for kind in one.kinds})
+    if len(kinds) > 1:
         raise InvalidInputError(
-            f"{len(electric)} of {len(given)} couplings are of a conductor (first: number {electric[0]}), which are no "
-            "ratios of pressures; write those of creeping.coupling"
+            f"ports are {' and '.join(kinds)}: hybrid parameters, which the format has of two ports only; write one "
+            "file for each kind"
         )
+    letter, factor, what = {
+        "point": ("S", 2 * np.pi * unit, "transfer ratios 2 pi r0 u of points on a hard body, r0"),
+        "monopole": ("Z", -IMPEDANCE * unit**2, "mutual impedances, ohm, of monopoles of height"),
+        "slot": ("Y", unit**2 / IMPEDANCE, "mutual admittances, siemens, of slots of length"),
+    }[kinds[0]]
     ports, k = given[0].ports, np.array([one.wavenumber for one in given])
     hertz = frequency(k, sound_speed=sound_speed)
     with written_aside(path) as aside, aside.open("w", encoding="ascii", newline="\n") as stream:
-        stream.write(f"! creeping: couplings of {len(ports)} ports on a hard body, as transfer ratios 2 pi r0 u\n")
-        stream.write(
-            f"! r0 = {unit!r} {given[0].length_unit}; no scattering parameters: S_ii is not known, and 0 here\n"
-        )
+        length, more = given[0].length_unit, "; no scattering parameters" if letter == "S" else ""
+        stream.write(f"! creeping: couplings of {len(ports)} ports: {what} {unit!r} {length}\n")
+        stream.write(f"! {letter}_ii is not known, and 0 here{more}\n")
         for number, port in enumerate(ports.tolist()):
-            stream.write(f"! port {number + 1} at {' '.join(map(repr, port))} {given[0].length_unit}\n")
+            name = f" {names[number]}" if names else ""
+            stream.write(f"! port {number + 1}{name} at {' '.join(map(repr, port))} {length}\n")
         bad = sum(int(np.sum(np.triu(~one.ok, 1))) for one in given)
         if bad:
             stream.write(f"! {bad} pairs of ports at some frequency have a status that is not OK\n")
-        stream.write("# HZ S RI R 1\n")
+        stream.write(f"# HZ {letter} RI R 1\n")
         for at, one in zip(np.asarray(hertz).tolist(), given, strict=True):
-            stream.writelines(_lines(at, 2 * np.pi * unit, one.values))
+            stream.writelines(_lines(at, factor, one.values))
 
 
 def _lines(hertz: float, factor: float, values: ComplexArray) -> Iterable[str]:

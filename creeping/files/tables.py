@@ -13,6 +13,7 @@ import numpy as np
 from creeping._typing import Any, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.results.comparison import cross_section_decibels, decibels
+from creeping.field.results.point_result import FieldStatus
 from creeping.files.polylines import polydata
 from creeping.geometry.checks import UNKNOWN, unit_of
 from creeping.rays.fan import RayFan
@@ -22,6 +23,7 @@ from creeping.storage.atomic import written_aside
 
 if TYPE_CHECKING:
     from creeping.field.cut_result import FieldCut
+    from creeping.field.ports.coupling_result import Coupling
     from creeping.field.results.echo import Echo
     from creeping.field.results.far_result import FarField
     from creeping.field.results.impulse import RangeProfile
@@ -348,3 +350,81 @@ def write_profile(path: str | os.PathLike[str], profiles: "dict[str, RangeProfil
         ("phase_deg", "", np.degrees(np.angle(values))),
     ]
     _write_table(path, columns)
+
+
+def write_couplings(
+    path: str | os.PathLike[str], couplings: "Sequence[Coupling]", names: Sequence[str], hertz: FloatArray | None = None
+) -> None:
+    """Write couplings of named ports over frequency as CSV, a row for each source, receiver and frequency.
+
+    Parameters
+    ----------
+    path : str or path
+    couplings : sequence of n Coupling
+    names : sequence of str
+        Of the ports.
+    hertz : (n,), Hz, optional
+        Frequencies; wavenumbers are written if there are none.
+
+    Raises
+    ------
+    CreepingError
+        If the file cannot be written.
+    """
+    pairs = np.nonzero(~np.eye(len(names), dtype=bool))
+    per, unit, ports = len(pairs[0]), couplings[0].unit, np.array(names)
+    values, error = (joined(getattr(one, name)[pairs] for one in couplings) for name in ("values", "error"))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        level, more = 20 * np.log10(np.abs(values)), 20 * np.log10(1 + error / np.abs(values))
+    columns: list[Column] = [
+        _wave_column(couplings, hertz, [per] * len(couplings)),
+        ("source", "name of the port", np.tile(ports[pairs[0]], len(couplings))),
+        ("receiver", "name of the port", np.tile(ports[pairs[1]], len(couplings))),
+        ("level_db", f"20 log10 of the field of a unit moment, re {unit}", level),
+        ("error_db", "by how much the level may be higher", more),
+        ("re", f"real part, {unit}; time factor exp(-i w t)", values.real),
+        ("im", f"imaginary part, {unit}", values.imag),
+        ("status", "of FieldStatus", [FieldStatus(code).name for one in couplings for code in one.status[pairs]]),
+        ("method", "rays, or beams where geodesics merge", joined(one.method[pairs] for one in couplings)),
+    ]
+    _write_table(path, columns)
+
+
+def write_paths(
+    path: str | os.PathLike[str], couplings: "Sequence[Coupling]", names: Sequence[str], hertz: FloatArray | None = None
+) -> None:
+    """Write the geodesics between named ports as CSV, a row for each geodesic and frequency; arguments as above.
+
+    Raises
+    ------
+    CreepingError
+        If the file cannot be written.
+    """
+    pairs = [(i, j) for i in range(len(names)) for j in range(i + 1, len(names))]
+    found = [[one.paths(i, j) for i, j in pairs] for one in couplings]
+    every = [one for row in found for one in row]
+    length, unit = couplings[0].length_unit, couplings[0].unit
+    which = [(ij, len(one)) for row in found for ij, one in zip(pairs, row, strict=True)]
+    wave = joined(one.wave for one in every)
+    columns: list[Column] = [
+        _wave_column(couplings, hertz, [sum(map(len, row)) for row in found]),
+        ("source", "name of the port", [names[i] for (i, _), count in which for _ in range(count)]),
+        ("receiver", "name of the port", [names[j] for (_, j), count in which for _ in range(count)]),
+        ("arclength", length, joined(one.arclength for one in every)),
+        ("caustics", "passed on the way", joined(one.caustics for one in every)),
+        ("spreading", f"J2, {length}", joined(one.spreading for one in every)),
+        ("xi", "Fock parameter, without unit", joined(one.fock_parameter for one in every)),
+        ("re", f"real part of the wave, {unit}", wave.real),
+        ("im", f"imaginary part of the wave, {unit}", wave.imag),
+    ]
+    for end in ("departure", "arrival"):
+        vectors = joined((getattr(one, end) for one in every), 3)
+        columns += [(f"{end}_{axis}", "unit tangent", vectors[:, k]) for k, axis in enumerate("xyz")]
+    _write_table(path, columns)
+
+
+def _wave_column(couplings: "Sequence[Coupling]", hertz: FloatArray | None, rows: Sequence[int]) -> Column:
+    """Frequency or wavenumber of each coupling, so many rows of each."""
+    if hertz is not None:
+        return "frequency_hz", "", np.repeat(hertz, rows)
+    return "wavenumber", f"1/{couplings[0].length_unit}", np.repeat([one.wavenumber for one in couplings], rows)

@@ -6,6 +6,7 @@ Sources: Derivations, F25.
 """
 
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import BoundaryLike
+from creeping.field.frequency import suited
 from creeping.field.ports.port_map import PortField, port_field
 from creeping.field.results.comparison import decibels, shown_range
 from creeping.field.results.labelled import power
@@ -30,6 +32,9 @@ from creeping.plotting.pictures import chosen_backend
 if TYPE_CHECKING:
     from creeping.field.ports.coupling_result import Coupling
     from creeping.field.sources import SourcePattern
+
+MOST_CURVES = 15
+"""Curves of a picture: of six colours with styles of their own, and more than that is no picture."""
 
 
 def coupling_picture(
@@ -111,7 +116,9 @@ def _ring(body: Surface, point: FloatArray, n: FloatArray) -> FloatArray:
     return project(body, point + radius * (np.cos(angle) * one + np.sin(angle) * np.cross(n, one)))
 
 
-def plot_coupling(found: "Coupling", ax: Any = None, *, span: float = 60.0, legend: bool | None = None) -> Any:
+def plot_coupling(
+    found: "Coupling", ax: Any = None, *, names: Sequence[str] = (), span: float = 60.0, legend: bool | None = None
+) -> Any:
     """Draw a coupling matrix: 20 log10 of each entry's size, what is not OK crossed out, the diagonal left empty.
 
     Parameters
@@ -119,6 +126,8 @@ def plot_coupling(found: "Coupling", ax: Any = None, *, span: float = 60.0, lege
     found : Coupling
     ax : matplotlib.axes.Axes, optional
         By default those of a new figure.
+    names : sequence of str
+        Of the ports; their numbers if not given.
     span : float, dB
         Range below the highest value.
     legend : bool
@@ -139,23 +148,86 @@ def plot_coupling(found: "Coupling", ax: Any = None, *, span: float = 60.0, lege
         # dark on light and light on dark
         for row, column in zip(*np.nonzero(np.isfinite(levels)), strict=True):
             colour = "black" if levels[row, column] > 0.5 * (low + high) else "white"
-            text = pages.minus(round(levels[row, column]))
+            below = found.error[row, column] >= np.abs(found.values[row, column])
+            level = decibels(np.array(found.error[row, column])) if below else levels[row, column]
+            text = ("<" if below else "") + pages.minus(round(float(level)))
             ax.text(column, row, text, ha="center", va="center", fontsize=7, color=colour)
     doubtful = ~found.ok & np.isfinite(found.values)
     if count <= 60 and doubtful.any():
         rows, columns = np.nonzero(doubtful)
         ax.plot(columns, rows, "x", color="#d55e00", markersize=9 if numbered else 4, label="not OK")
-    per = found.to_xarray()["total"].attrs["units"]
-    per = per if per.startswith("1/") else f"1 {per}"
-    pages.add_bar(
-        ax.figure, image, f"20 log$_{{10}}$ (dB re {per})", extend=pages.beyond(levels, low, high), fontsize=9, ax=ax
-    )
+    pages.add_bar(ax.figure, image, _level_name(found), extend=pages.beyond(levels, low, high), fontsize=9, ax=ax)
     ax.set_xlabel("receiver", fontsize=9)
     ax.set_ylabel("source", fontsize=9)
     ax.tick_params(labelsize=8, width=0.5)
     ax.xaxis.get_major_locator().set_params(integer=True)
     ax.yaxis.get_major_locator().set_params(integer=True)
+    if names:
+        ax.set_xticks(range(count), names, rotation=45 if max(map(len, names)) > 4 else 0)
+        ax.set_yticks(range(count), names)
     return pages.finished(ax, fresh, pages.wave_title(found, found.length_unit), legend)
+
+
+def plot_coupling_band(
+    found: "Sequence[Coupling]",
+    ax: Any = None,
+    *,
+    names: Sequence[str] = (),
+    hertz: FloatArray | None = None,
+    span: float = 60.0,
+    legend: bool | None = None,
+) -> Any:
+    """Draw the coupling of each pair of ports over frequency, dB, with its error as a band; faint where it is not OK.
+
+    Parameters
+    ----------
+    found : sequence of Coupling
+        Of the same ports at ascending wavenumbers; of up to fifteen pairs.
+    ax : matplotlib.axes.Axes, optional
+        By default those of a new figure.
+    names : sequence of str
+        Of the ports; their numbers if not given.
+    hertz : (n,), Hz, optional
+        Frequencies; else the wavenumber is the axis.
+    span : float, dB
+        Range below the highest value.
+    legend : bool
+        By default on a new figure only.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InvalidInputError
+        If there are more pairs than curves that can be told apart.
+    """
+    count = len(found[0].ports)
+    pairs = [(i, j) for i in range(count) for j in range(i + 1, count)]
+    if len(pairs) > MOST_CURVES:
+        raise InvalidInputError(f"{len(pairs)} pairs of ports are more than {MOST_CURVES} curves; plot single matrices")
+    fresh, ax = pages.axes_or_new(ax, pages.PAGE)
+    scale, unit = suited(float(hertz[-1])) if hertz is not None else (1.0, f"1/{found[0].length_unit}")
+    x = np.array([one.wavenumber for one in found]) if hertz is None else np.asarray(hertz) / scale
+    curves = []
+    for number, (i, j) in enumerate(pairs):
+        size, off, ok = (np.array([getattr(one, name)[i, j] for one in found]) for name in ("values", "error", "ok"))
+        size, style = np.abs(size), pages.curve_style(number)
+        label = f"{names[i] if names else i} to {names[j] if names else j}{'' if ok.all() else ', faint: not OK'}"
+        ax.plot(x, decibels(size), **style | {"alpha": 0.35})
+        ax.plot(x, np.where(ok, decibels(size), np.nan), label=label, **style)
+        low = decibels(np.maximum(size - off, 1e-3 * size))
+        ax.fill_between(x, low, decibels(size + off), color=style["color"], alpha=0.14, linewidth=0)
+        curves.append(decibels(size))
+    ax.set_ylim(*shown_range(curves, span))
+    pages.dressed(ax, f"frequency ({unit})" if hertz is not None else f"k ({unit})", _level_name(found[0]))
+    return pages.finished(ax, fresh, found[0].boundary, legend)
+
+
+def _level_name(found: "Coupling") -> str:
+    per = found.unit if found.unit.startswith("1/") else f"1 {found.unit}"
+    return f"20 log$_{{10}}$ (dB re {per})"
 
 
 def plot_pattern(found: "SourcePattern", ax: Any = None, *, span: float = 60.0, legend: bool | None = None) -> Any:
