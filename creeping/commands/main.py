@@ -15,8 +15,8 @@ from cyclopts import App, CycloptsError, Group, Parameter, validators
 
 from creeping._progress import Progress
 from creeping._version import __version__
+from creeping.commands import antennas as _antennas
 from creeping.commands import check as _checking
-from creeping.commands import coupling as _coupling_command
 from creeping.commands import echo as _echo_command
 from creeping.commands import explore as _explore_command
 from creeping.commands import options, resuming
@@ -332,7 +332,7 @@ app.command(_echo_command.ts)
 app.command(_checking.check)
 app.command(_sweep_command.sweep)
 app.command(_explore_command.explore)
-app.command(_coupling_command.coupling)
+app.command(_antennas.coupling)
 cache_app.command(_upkeep.list_maps, name="ls")
 cache_app.command(_upkeep.verify_maps, name="verify")
 cache_app.command(_upkeep.clear_maps, name="clear")

@@ -121,7 +121,8 @@ def surface_currents(
         return _of_line(fan, found)
     poor = facing or currents.unserved > CUT or currents.stepped > 0 or not currents.extinction <= POOR
     found = solution_for(*problem) if solve is None and poor else None
-    if found:
+    # both are measured the same way; what expansions leave is not known where the body is too thin for points inside
+    if found and not found.currents.extinction > currents.extinction:
         return _of_line(fan, found)
     if facing and currents.boundary.kind in ("soft", "hard", "conductor"):
         currents.values[currents.lit] += currents.reflected_onto(lit.points, lit.normals)

@@ -25,6 +25,7 @@ from creeping.geometry.memo import memo
 from creeping.geometry.parts import inside, is_faceted, why_no_rays
 from creeping.geometry.patches import SHARP, Patches, chordal, facet_patches, halved, own_triangles, sides_of, turns_of
 from creeping.geometry.piecewise import is_piecewise
+from creeping.geometry.plane_faces import with_whole_faces
 
 CHEAP = 4000
 """Nodes up to which those of five a side serve: of a body that is small against the wavelength it is its own shape that
@@ -159,10 +160,17 @@ class Faceted(Protocol):
 def facet_tiles(
     body: Faceted, wavenumber: float, boundary: Boundary, *, finest: bool = False, coarse: bool = False
 ) -> Tiles:
-    """Tiles of a body on its facets for a wavenumber, 1/L, and a boundary: of the rule with the fewest nodes."""
+    """Tiles of a body on its facets for a wavenumber, 1/L, and a boundary: of the rule with the fewest nodes.
+
+    Of the triangles as they are, or of others for the same flat faces.
+    """
     wavelength = (VARYING if boundary.varies else 1.0) * 2 * np.pi / wavenumber
     rules = COARSE_RULES if coarse else RULES
-    rule = rules[-1] if finest else _chosen(body, wavelength, rules)
+    rules = rules[-1:] if finest else rules
+    whole = memo(body, "whole faces", lambda: with_whole_faces(body))
+    (cost, rule), fewer = _chosen(body, wavelength, rules), None if whole is None else _chosen(whole, wavelength, rules)
+    if whole is not None and fewer is not None and fewer[0] <= cost:
+        body, rule = whole, fewer[1]
     if rule.squares:
         k = 2 * np.pi / wavelength
         made = tiles_for(_patches(body), k, side=rule.side, p=rule.p, cut=rule.cut, lacks=rule.lacks)
@@ -178,8 +186,8 @@ def _patches(body: Faceted) -> Patches:
     return memo(body, "facet patches", lambda: facet_patches(body))
 
 
-def _chosen(body: Faceted, wavelength: float, rules: tuple[Rule, ...]) -> Rule:
-    """The rule of some that takes the fewest nodes, each as much as it is worth."""
+def _chosen(body: Faceted, wavelength: float, rules: tuple[Rule, ...]) -> tuple[float, Rule]:
+    """The rule of some that takes the fewest nodes, each as much as it is worth, and their number, so weighted."""
     corners = body.vertices[body.triangles]
     _, number = sides_of(body.triangles)
     edged = bool(np.any(turns_of(body.vertices, body.triangles, number)[0] > SHARP))
@@ -190,9 +198,13 @@ def _chosen(body: Faceted, wavelength: float, rules: tuple[Rule, ...]) -> Rule:
             nodes[rule] = rule.p**2 * _halves(corners, rule.side * wavelength)
         elif patches is not None:
             nodes[rule] = rule.p**2 * _parts_of(patches, rule.side * wavelength)
+    if not nodes:
+        return np.inf, rules[-1]
     if nodes.get(rules[-1], np.inf) < CHEAP:
-        return rules[-1]
-    return min(nodes, key=lambda rule: nodes[rule] * (rule.poorer if edged else 1.0))
+        return nodes[rules[-1]], rules[-1]
+    return min(
+        ((count * (rule.poorer if edged else 1.0), rule) for rule, count in nodes.items()), key=lambda one: one[0]
+    )
 
 
 def _halves(corners: FloatArray, longest: float) -> float:

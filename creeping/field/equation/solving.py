@@ -40,6 +40,9 @@ KEPT = 6
 """Solutions kept with a body."""
 POOR = 0.05
 """What currents may leave of the incident wave inside: those that leave more have not been resolved."""
+USELESS = 1.0
+"""What currents without an incident wave leave inside: those that leave as much are none. Less is a field with a
+measured error, which rays and optics, which know of no second reflection, have not."""
 SAME = 1e-14
 """Difference of unit directions that are one."""
 
@@ -134,14 +137,17 @@ class Solved(NamedTuple):
 
 
 def solution_for(body: Surface, direction: FloatArray, wavenumber: float, boundary: BoundaryLike) -> Solved | None:
-    """The solution of an incidence, if the equation of the body costs less than SECONDS and resolves it, else None."""
+    """The solution of an incidence, if the equation of the body costs less than SECONDS, else None.
+
+    Its error says how well it is resolved.
+    """
     if is_rough(body):
         return None
     found = _found(body, direction, wavenumber, boundary)
     if found is None:
         solve_together(body, direction[None], wavenumber, boundary)
         found = _found(body, direction, wavenumber, boundary)
-    if found is None or not found.currents.extinction <= POOR:
+    if found is None or not found.currents.extinction < USELESS:
         return None
     return found
 

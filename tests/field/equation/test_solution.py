@@ -8,6 +8,7 @@ import creeping as cr
 import scatterers as sc
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.equation import effort, solving
+from creeping.field.equation.currents import TileCurrents
 from creeping.field.equation.effort import Effort, plan_of
 from tests.reference import sphere
 
@@ -185,6 +186,14 @@ def test_next_to_edges_and_faces_the_field_is_continuous(flat):
     assert np.all(np.abs(np.diff(u)) < 0.05) and np.all(np.abs(u) < 2.5)
     side, above = [(1.0, 0.0, 0.3)], [(1.0001, 0.0, 0.3)]
     assert_allclose(flat.near_field(above, 0).values, flat.surface_field(side, 0).values, atol=5e-3)
+
+
+def test_a_solution_serves_as_long_as_it_is_one(monkeypatch):
+    """Rays and optics, which know of one reflection, may not stand for what is solved to a tenth."""
+    d = np.array([0.6, 0.0, 0.8])
+    for left, served in ((0.3, True), (1.5, False), (np.nan, False)):
+        monkeypatch.setattr(TileCurrents, "extinction", left)
+        assert (solving.solution_for(CYLINDER, d, 2.0, "hard") is not None) == served
 
 
 def test_what_cannot_be_solved_is_told(flat, monkeypatch):

@@ -8,7 +8,7 @@ from command_line import creeping, ran, table
 
 import creeping as cr
 import scatterers as sc
-from creeping.commands.coupling import parse_ports
+from creeping.commands.antennas import parse_ports
 from creeping.errors import InvalidInputError
 
 PORTS = ("--port", "a=0,0,1", "--port", "b=1,0,0", "--port", "0,-0.99,0")

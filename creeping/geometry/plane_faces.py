@@ -1,0 +1,183 @@
+"""Flat faces of a mesh with few triangles: those in one plane are joined, and their outline is cut into others.
+
+Triangles that hang together and lie in one plane are a face. Of the corners of its outline those stay where three faces
+meet, or where the outline turns; each face is then cut into triangles by its ears, with its holes joined to the outline
+by bridges first.
+
+Sources: [M75] for the ears, [E02] for the bridges.
+"""
+
+import numpy as np
+
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
+from creeping.geometry.patches import PLANE, Triangles, sides_of, turns_of
+
+MOST = 500
+"""Corners of a face's outline at most: ears take the square of them."""
+
+
+def with_whole_faces(body: Any) -> Triangles | None:
+    """The same body, ``vertices`` (n, 3) and ``triangles`` (t, 3), by fewer triangles; None where there are not fewer.
+
+    Examples
+    --------
+    >>> import trimesh
+    >>> box = trimesh.creation.box().subdivide().subdivide()
+    >>> found = with_whole_faces(Triangles(box.vertices, box.faces, False))
+    >>> len(box.faces), len(found.triangles)
+    (192, 12)
+    """
+    vertices, triangles = np.asarray(body.vertices), np.asarray(body.triangles)
+    face = _faces(vertices, triangles)
+    if 4 * face.max(initial=0) > len(triangles):
+        return None
+    outlines = _outlines(triangles, face)
+    if outlines is None:
+        return None
+    stays = _corners(vertices, outlines)
+    found: list[IntArray] = []
+    for number, loops in enumerate(outlines):
+        mine = [loop[stays[loop]] for loop in loops]
+        normal = _normal(vertices, triangles[face == number])
+        cut = _cut(vertices, mine, normal)
+        if cut is None:
+            return None
+        found.append(cut)
+    made = np.concatenate(found)
+    used, renumbered = np.unique(made, return_inverse=True)
+    whole = Triangles(vertices[used], renumbered.reshape(-1, 3), bool(getattr(body, "tessellated", False)))
+    same = np.isclose(_area(whole.vertices, whole.triangles), _area(vertices, triangles), rtol=1e-6)
+    closed = np.all(np.bincount(sides_of(whole.triangles)[1].ravel()) == 2)
+    return whole if same and closed and len(made) < len(triangles) else None
+
+
+def _faces(vertices: FloatArray, triangles: IntArray) -> IntArray:
+    """Number of the face of each triangle (t,)."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    _, number = sides_of(triangles)
+    turned, beside = turns_of(vertices, triangles, number)
+    one, other = beside[turned < PLANE].T
+    graph = coo_matrix((np.ones(len(one)), (one, other)), shape=(len(triangles), len(triangles)))
+    return np.asarray(connected_components(graph, directed=False)[1])
+
+
+def _outlines(triangles: IntArray, face: IntArray) -> list[list[IntArray]] | None:
+    """Loops of each face's outline, the face on their left; None if an outline meets itself."""
+    _, number = sides_of(triangles)
+    starts, ends = triangles[:, [1, 2, 0]].ravel(), triangles[:, [2, 0, 1]].ravel()
+    sides, owner = number.ravel(), np.repeat(face, 3)
+    inner = np.zeros(sides.max() + 1, dtype=bool)
+    order = np.argsort(sides, kind="stable").reshape(-1, 2)
+    inner[sides[order[:, 0]]] = owner[order[:, 0]] == owner[order[:, 1]]
+    found: list[list[IntArray]] = [[] for _ in range(face.max() + 1)]
+    onward: list[dict[int, int]] = [{} for _ in found]
+    for at in np.flatnonzero(~inner[sides]).tolist():
+        own = onward[owner[at]]
+        if int(starts[at]) in own:
+            return None
+        own[int(starts[at])] = int(ends[at])
+    for loops, own in zip(found, onward, strict=True):
+        while own:
+            first, step = next(iter(own.items()))
+            loop = [first]
+            del own[first]
+            while step != first:
+                loop.append(step)
+                step = own.pop(step)
+            loops.append(np.array(loop))
+    return found
+
+
+def _corners(vertices: FloatArray, outlines: list[list[IntArray]]) -> BoolArray:
+    """Which vertices (n,) stay: where other than two faces meet, or outlines turn."""
+    met, turns = np.zeros(len(vertices), dtype=int), np.zeros(len(vertices), dtype=bool)
+    for loops in outlines:
+        for loop in loops:
+            back, ahead = (vertices[np.roll(loop, -step)] - vertices[loop] for step in (-1, 1))
+            across = np.linalg.norm(np.cross(-back, ahead), axis=1)
+            turns[loop] |= np.arctan2(across, np.sum(-back * ahead, axis=1)) > PLANE
+            met[loop] += 1
+    return np.asarray((met > 0) & (turns | (met != 2)))
+
+
+def _normal(vertices: FloatArray, triangles: IntArray) -> FloatArray:
+    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
+    total = np.sum(np.cross(b - a, c - a), axis=0)
+    return np.asarray(total / np.linalg.norm(total))
+
+
+def _area(vertices: FloatArray, triangles: IntArray) -> float:
+    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
+    return float(0.5 * np.sum(np.linalg.norm(np.cross(b - a, c - a), axis=1)))
+
+
+def _cut(vertices: FloatArray, loops: list[IntArray], normal: FloatArray) -> IntArray | None:
+    """Triangles (t, 3) of a face between loops; None if it has too many corners, or no ear."""
+    if sum(map(len, loops)) > MOST or min(map(len, loops)) < 3:
+        return None
+    along = np.linalg.svd(normal[None])[2][1]
+    flat = vertices @ np.stack([along, np.cross(normal, along)], axis=1)
+    areas = [_turning(flat[loop]) for loop in loops]
+    if sum(area > 0 for area in areas) != 1:
+        return None
+    outer = loops[int(np.argmax(areas))].tolist()
+    holes = [loop.tolist() for loop, area in zip(loops, areas, strict=True) if area <= 0]
+    for hole in sorted(holes, key=lambda one: -np.max(flat[one, 0])):
+        outer = _bridged(flat, outer, hole)
+    return _ears(flat, outer)
+
+
+def _turning(outline: FloatArray) -> float:
+    """Twice the area within an outline (n, 2), positive counter-clockwise."""
+    x, y = outline.T
+    return float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+
+def _bridged(flat: FloatArray, outer: list[int], hole: list[int]) -> list[int]:
+    """The outline with a hole, joined by a bridge from the hole's rightmost corner to the nearest one it sees."""
+    start = int(np.argmax(flat[hole, 0]))
+    hole = hole[start:] + hole[:start]
+    at, p = flat[outer], flat[hole[0]]
+    ends = np.roll(at, -1, axis=0)
+    for number in np.argsort(np.linalg.norm(at - p, axis=1), kind="stable").tolist():
+        q = at[number]
+        # a side with an end at q does not hide it
+        apart = np.all(at != q, axis=1) & np.all(ends != q, axis=1)
+        crossed = (_side(p, q, at) * _side(p, q, ends) <= 0) & (_side(at, ends, p) * _side(at, ends, q) <= 0) & apart
+        if not np.any(crossed):
+            return [*outer[: number + 1], *hole, hole[0], *outer[number:]]
+    return outer + hole
+
+
+def _side(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
+    """Twice the area of triangles abc, positive counter-clockwise."""
+    u, v = b - a, c - a
+    return np.asarray(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])
+
+
+def _ears(flat: FloatArray, outline: list[int]) -> IntArray | None:
+    """Triangles (t, 3) of an outline: of the ears there are, the one with the largest least angle is cut first."""
+    left, found = list(outline), []
+    while len(left) > 3:
+        here = np.array(left)
+        a, b, c = flat[np.roll(here, 1)], flat[here], flat[np.roll(here, -1)]
+        area = _side(a, b, c)
+        longest = np.max([np.sum((p - q) ** 2, axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)
+        shape = area / longest
+        for number in np.argsort(-shape, kind="stable").tolist():
+            if shape[number] <= PLANE:
+                return None
+            corners = here[[number - 1, number, (number + 1) % len(here)]]
+            others = flat[np.setdiff1d(here, corners)]
+            p, q, r = flat[corners]
+            inside = (_side(p, q, others) >= 0) & (_side(q, r, others) >= 0) & (_side(r, p, others) >= 0)
+            if not np.any(inside):
+                break
+        else:
+            return None
+        found.append(corners)
+        left.pop(number)
+    found.append(np.array(left))
+    return np.stack(found)
