@@ -7,6 +7,7 @@ for point sources on a hard body. Values are those of `creeping.antenna_coupling
 
 import json
 import re
+import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -88,6 +89,10 @@ def coupling(
     started = time.perf_counter()
     ports = parse_ports(port, kind)
     k, hertz = _waves(wavenumber, frequency, sound_speed)
+    if size is not None and not 0 < size < float("inf"):
+        raise InvalidInputError(f"--size {size!r} is not a positive finite number")
+    if size is not None and len(set(ports.kinds)) > 1:
+        raise InvalidInputError("--size makes a Touchstone file, which has one kind of ports: slots or monopoles")
     if size is not None and hertz is None:
         raise InvalidInputError("--size makes a Touchstone file, which is over frequency: give --frequency")
     if len(k) * len(ports.names) ** 2 > MOST:
@@ -104,7 +109,12 @@ def coupling(
             progress.told(number + 1, len(k))
     output.mkdir(parents=True, exist_ok=True)
     files = _write(output, ports, found, hertz, size, sound_speed)
-    if pictures:
+    from creeping.plotting.coupling_pictures import MOST_CURVES
+
+    pairs = len(ports.names) * (len(ports.names) - 1) // 2
+    if pictures and len(found) > 1 and pairs > MOST_CURVES:
+        print(f"creeping: no picture: {pairs} pairs are more curves than can be told apart", file=sys.stderr)
+    elif pictures:
         _draw(output / "coupling.png", ports, found, hertz, title_of(body))
         files.append("coupling.png")
     states: dict[str, int] = {}
@@ -138,7 +148,7 @@ def parse_ports(texts: Sequence[str], kind: str) -> Ports:
 
     rows: list[tuple[str, list[float], list[float] | None]] = []
     for number, text in enumerate(texts):
-        match = re.fullmatch(rf"(?:([^=,/]+)=)?{_VECTOR}(?:/{_VECTOR})?", text.replace(" ", ""))
+        match = re.fullmatch(rf"(?:([^=,/\"']+)=)?{_VECTOR}(?:/{_VECTOR})?", text.replace(" ", ""))
         try:
             values = [float(part) for part in (match.groups()[1:] if match else ()) if part is not None]
         except ValueError:
@@ -174,7 +184,7 @@ def _waves(wavenumber: float | None, frequency: str | None, sound_speed: float |
         # as typed: k and back leaves rounding
         return k, np.array([float(f"{one:.12g}") for one in np.atleast_1d(hertz_of(k, sound_speed=sound_speed))])
     one, hertz, _ = asked_wavenumber(wavenumber, frequency, None, sound_speed)
-    return np.array([one]), None if hertz is None else np.array([hertz])
+    return np.array([one]), None if hertz is None else np.array([float(f"{hertz:.12g}")])
 
 
 def _on_body(shape: Any, ports: Ports) -> tuple[Any, str]:

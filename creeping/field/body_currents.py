@@ -21,6 +21,7 @@ from creeping.field.currents.nodes import RAYS, STEPS, LitNodes, lit_nodes, lit_
 from creeping.field.currents.radiation import grid_cells, transformed
 from creeping.field.currents.whole_body import POINTS as POINTS_INSIDE
 from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.field.equation import solving
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
 from creeping.field.equation.effort import expected_seconds_of, too_much
 from creeping.field.equation.solving import Solved, asked_solution, solution_for
@@ -103,7 +104,7 @@ def surface_currents(
         return _of_line(fan, asked_solution(*problem))
     # expansions know little of joints and tips, and nothing of edges
     found = solution_for(*problem) if solve is None and is_piecewise(fan.body) else None
-    if found:
+    if found and (found.currents.extinction <= solving.POOR or not has_expansions(fan.body, boundary)):
         return _of_line(fan, found)
     if not has_expansions(fan.body, boundary):
         raise InvalidInputError(

@@ -284,7 +284,7 @@ def field_cut(
     >>> cr.field_cut(solution, step=0.5).status_counts["OK"] > 20
     True
     """
-    given = (wavenumber, boundary, order, method) if isinstance(source, RayFan) else ()
+    given = wavenumber, boundary, order, method
     grid = cut_grid(source, *given, point=point, across=across, up=up, extent=extent, step=step, incidence=incidence)
     conductor = (boundary if isinstance(source, RayFan) else source.boundary) == "pec"
     if not conductor and polarisation is not None:
@@ -358,8 +358,10 @@ def cut_grid(
     ((7, 7), (40, 3))
     """
     if isinstance(source, Solution):
+        if wavenumber is not None or (boundary, order, method) != ("soft", 2, "auto"):
+            raise InvalidInputError("a solution has its own wavenumber, boundary and method; leave them out")
         k, weight = source.wavenumber, 0.0
-        if not 0 <= incidence < len(source.directions):
+        if isinstance(incidence, float) or not 0 <= incidence < len(source.directions):
             raise InvalidInputError(f"incidence = {incidence}: the solution has {len(source.directions)}, from 0")
         direction = source.directions[incidence]
     else:

@@ -98,11 +98,11 @@ def composed(
     status = np.where(harmless, FieldStatus.OK, status)
     error = np.where(bare, unit, error)
     # on the lit side rays that come from afar have decayed: those that are not to be trusted are left out, and no more
-    # than what an axis makes of them, sqrt(2 pi k a)
+    # than what an axis makes of them, sqrt(2 pi k a); of those that have left the body, what is left inside tells
     most = unit * rays.faded * np.sqrt(2 * np.pi * k * size(fan.body))
     out = (share == 1) & ((status != FieldStatus.OK) | (error > most))
     creeping = np.where(out.reshape(-1, *(1,) * (creeping.ndim - 1)), 0.0, creeping)
-    error = np.where(out, np.where(bare, 0.0, np.fmin(error, most)), error)
+    error = np.where(out, np.where(bare | (status == FieldStatus.DETACHED), 0.0, np.fmin(error, most)), error)
     status = np.where(share == 1, FieldStatus.OK, status)
     return PointValues(
         wave=wave,

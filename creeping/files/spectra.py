@@ -9,7 +9,7 @@ is 1/(2 pi r0). It is written as S_ij: a transfer ratio without unit, not a scat
 of what ports reflect, S_ii is 0, and columns are not bounded by 1. On a conductor
 
     Z_ij = -Z_0 l^2 E_ij     monopoles of height l, ohm
-    Y_ij = l^2 H_ij/Z_0      slots of length l, siemens
+    Y_ij = -l^2 H_ij/Z_0     slots of length l, siemens
 
 with E and H those of `creeping.monopole_coupling` and `creeping.slot_coupling`; Z_ii and Y_ii are not known, and 0.
 Numbers are conjugated, for e^{+jwt}.
@@ -131,11 +131,12 @@ def write_touchstone(
     letter, factor, what = {
         "point": ("S", 2 * np.pi * unit, "transfer ratios 2 pi r0 u of points on a hard body, r0"),
         "monopole": ("Z", -IMPEDANCE * unit**2, "mutual impedances, ohm, of monopoles of height"),
-        "slot": ("Y", unit**2 / IMPEDANCE, "mutual admittances, siemens, of slots of length"),
+        "slot": ("Y", -(unit**2) / IMPEDANCE, "mutual admittances, siemens, of slots of length"),
     }[kinds[0]]
     ports, k = given[0].ports, np.array([one.wavenumber for one in given])
-    hertz = frequency(k, sound_speed=sound_speed)
-    with written_aside(path) as aside, aside.open("w", encoding="ascii", newline="\n") as stream:
+    # as typed: k and back leaves rounding
+    hertz = [float(f"{one:.12g}") for one in np.atleast_1d(frequency(k, sound_speed=sound_speed))]
+    with written_aside(path) as aside, aside.open("w", encoding="ascii", errors="replace", newline="\n") as stream:
         length, more = given[0].length_unit, "; no scattering parameters" if letter == "S" else ""
         stream.write(f"! creeping: couplings of {len(ports)} ports: {what} {unit!r} {length}\n")
         stream.write(f"! {letter}_ii is not known, and 0 here{more}\n")
@@ -146,7 +147,7 @@ def write_touchstone(
         if bad:
             stream.write(f"! {bad} pairs of ports at some frequency have a status that is not OK\n")
         stream.write(f"# HZ {letter} RI R 1\n")
-        for at, one in zip(np.asarray(hertz).tolist(), given, strict=True):
+        for at, one in zip(hertz, given, strict=True):
             stream.writelines(_lines(at, factor, one.values))
 
 

@@ -14,10 +14,14 @@ from creeping.geometry.patches import PLANE, Triangles, sides_of, turns_of
 
 MOST = 500
 """Corners of a face's outline at most: ears take the square of them."""
+BULGE = 1e-6
+"""How far corners of a face may be from its plane, over its extent: rounding of what is written in single precision."""
 
 
 def with_whole_faces(body: Any) -> Triangles | None:
     """The same body, ``vertices`` (n, 3) and ``triangles`` (t, 3), by fewer triangles; None where there are not fewer.
+
+    And where a face cannot be cut: of all faces or of none.
 
     Examples
     --------
@@ -36,10 +40,12 @@ def with_whole_faces(body: Any) -> Triangles | None:
         return None
     stays = _corners(vertices, outlines)
     found: list[IntArray] = []
-    for number, loops in enumerate(outlines):
-        mine = [loop[stays[loop]] for loop in loops]
-        normal = _normal(vertices, triangles[face == number])
-        cut = _cut(vertices, mine, normal)
+    each = np.split(triangles[np.argsort(face, kind="stable")], np.cumsum(np.bincount(face))[:-1])
+    for own, loops in zip(each, outlines, strict=True):
+        normal, corners = _normal(vertices, own), vertices[np.unique(own)]
+        # neighbours in one plane may bend together
+        bulges = np.ptp((corners - corners.mean(axis=0)) @ normal) > BULGE * np.max(np.ptp(corners, axis=0))
+        cut = None if bulges else _cut(vertices, [loop[stays[loop]] for loop in loops], normal)
         if cut is None:
             return None
         found.append(cut)
@@ -124,8 +130,9 @@ def _cut(vertices: FloatArray, loops: list[IntArray], normal: FloatArray) -> Int
         return None
     outer = loops[int(np.argmax(areas))].tolist()
     holes = [loop.tolist() for loop, area in zip(loops, areas, strict=True) if area <= 0]
-    for hole in sorted(holes, key=lambda one: -np.max(flat[one, 0])):
-        outer = _bridged(flat, outer, hole)
+    holes = sorted(holes, key=lambda one: -np.max(flat[one, 0]))
+    for number, hole in enumerate(holes):
+        outer = _bridged(flat, outer, hole, holes[number + 1 :])
     return _ears(flat, outer)
 
 
@@ -135,17 +142,24 @@ def _turning(outline: FloatArray) -> float:
     return float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 
 
-def _bridged(flat: FloatArray, outer: list[int], hole: list[int]) -> list[int]:
+def _bridged(flat: FloatArray, outer: list[int], hole: list[int], others: list[list[int]]) -> list[int]:
     """The outline with a hole, joined by a bridge from the hole's rightmost corner to the nearest one it sees."""
     start = int(np.argmax(flat[hole, 0]))
     hole = hole[start:] + hole[:start]
     at, p = flat[outer], flat[hole[0]]
-    ends = np.roll(at, -1, axis=0)
+    before, after = np.roll(at, 1, axis=0), np.roll(at, -1, axis=0)
+    loops = [flat[loop] for loop in (outer, hole, *others)]
+    starts, ends = np.concatenate(loops), np.concatenate([np.roll(loop, -1, axis=0) for loop in loops])
     for number in np.argsort(np.linalg.norm(at - p, axis=1), kind="stable").tolist():
-        q = at[number]
-        # a side with an end at q does not hide it
-        apart = np.all(at != q, axis=1) & np.all(ends != q, axis=1)
-        crossed = (_side(p, q, at) * _side(p, q, ends) <= 0) & (_side(at, ends, p) * _side(at, ends, q) <= 0) & apart
+        a, q, c = before[number], at[number], after[number]
+        # where another bridge ends q stands twice: the bridge leaves within the face
+        left, right = _side(a, q, p) > 0, _side(q, c, p) > 0
+        if not ((left and right) if _side(a, q, c) > 0 else (left or right)):
+            continue
+        # a side with an end at p or q hides neither
+        apart = np.all([np.any(end != one, axis=1) for end in (starts, ends) for one in (p, q)], axis=0)
+        across = _side(p, q, starts) * _side(p, q, ends) <= 0
+        crossed = across & (_side(starts, ends, p) * _side(starts, ends, q) <= 0) & apart
         if not np.any(crossed):
             return [*outer[: number + 1], *hole, hole[0], *outer[number:]]
     return outer + hole

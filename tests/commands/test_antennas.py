@@ -68,6 +68,8 @@ def test_tables_hold_what_the_library_gives(tmp_path, capsys):
 def test_what_cannot_be_is_refused(tmp_path, capsys):
     asked = {
         ("sphere", *PORTS, "--wavenumber", 20, "--size", 0.1): "Touchstone file, which is over frequency",
+        ("sphere", *PORTS, "--frequency", "1GHz", "--size", -1): "--size -1.0 is not a positive",
+        ("sphere", "--port", "0,0,1/1,0,0", *PORTS[2:], "--frequency", "1GHz", "--size", 1): "one kind of ports",
         ("sphere", "--port", "a=0,0,2", "--port", "b=1,0,0", "--wavenumber", 20): "--port a: off the body by up to 1",
         ("sphere", *PORTS): "no wave given",
         ("cylinder:radius=1,length=2", *PORTS, "--wavenumber", 20): "needs a smooth body",

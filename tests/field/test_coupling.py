@@ -358,3 +358,15 @@ def test_touchstone_comes_back(count, tmp_path):
     moved = replace(found[1], ports=found[1].ports[::-1])
     with pytest.raises(InvalidInputError, match="1 of 2 couplings are of other ports"):
         write_touchstone(path, [found[0], moved], reference_distance=0.5)
+
+
+@pytest.mark.parametrize("kind", ["slots", "monopoles"])
+def test_touchstone_of_near_ports_is_their_passive_self_value(kind, tmp_path):
+    """Re Z_12 and Re Y_12 tend to what an antenna on a plane radiates: twice k^2 l^2/(6 pi), times Z_0 or over it."""
+    k, apart, length = 30.0, 0.02, 1e-3
+    ports = np.array([[0.0, np.sin(angle), np.cos(angle)] for angle in (0.0, apart)])
+    found = coupled(kind, sc.Sphere(), ports, np.broadcast_to([1.0, 0, 0], (2, 3)), wavenumber=k)
+    write_touchstone(tmp_path / "two.s2p", [found], reference_distance=length)
+    row = next(line for line in (tmp_path / "two.s2p").read_text().splitlines() if line[0] not in "!#").split()
+    own = k**2 * length**2 / (3 * np.pi) * (376.730313668 if kind == "monopoles" else 1 / 376.730313668)
+    assert abs(float(row[3]) / own - 1) < 0.25

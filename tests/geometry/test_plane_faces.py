@@ -52,3 +52,32 @@ def test_what_is_curved_or_coarse_stays_as_it_is():
     assert with_whole_faces(triangles_of(trimesh.creation.box())) is None
     # a cylinder keeps its side; that outlines are long is told
     assert with_whole_faces(triangles_of(trimesh.creation.cylinder(1.0, 2.0, sections=600).subdivide())) is None
+
+
+def test_plates_with_many_holes_are_cut():
+    """Bridges that end where others do, and holes behind holes."""
+    pytest.importorskip("manifold3d")
+    rng, plate = np.random.default_rng(4), trimesh.creation.box((2, 2, 0.3))
+    places = [(x, y) for x in (-0.6, 0.0, 0.6) for y in (-0.6, 0.0, 0.6)]
+    holes = [
+        trimesh.creation.cylinder(0.15 + 0.08 * rng.random(), 1.0, sections=int(rng.integers(3, 8))).apply_translation(
+            (*place, 0)
+        )
+        for place in places
+    ]
+    fine = turned(trimesh.boolean.difference([plate, *holes]).subdivide_to_size(0.2), 3)
+    found = with_whole_faces(triangles_of(fine))
+    whole = trimesh.Trimesh(found.vertices, found.triangles, process=False)
+    assert whole.is_watertight and np.isclose(whole.volume, fine.volume) and 3 * len(found.triangles) < len(fine.faces)
+
+
+def test_a_bulge_is_no_plane():
+    """A cap whose triangles each turn by less than what counts as flat."""
+    box = trimesh.creation.box((2, 2, 1)).apply_translation((0, 0, -0.5)).subdivide_to_size(0.06)
+    box.vertices[:, 2] += np.where(
+        np.abs(box.vertices[:, 2]) < 1e-12, 4e-5 * (1 - box.vertices[:, 0] ** 2) * (1 - box.vertices[:, 1] ** 2), 0.0
+    )
+    found = with_whole_faces(triangles_of(box))
+    assert found is None or np.isclose(
+        trimesh.Trimesh(found.vertices, found.triangles, process=False).volume, box.volume, rtol=1e-7
+    )

@@ -8,7 +8,7 @@ J_lit is that of `creeping.field.currents.conductor`, J_thrown is what the surfa
 that of creeping modes where the march is impossible or would take too long. Where the integral equation is solved its
 solution stands for all of it, and n.E is that of `creeping.field.equation.currents`. Errors and statuses are those of
 scalar fields on the body (`creeping.field.on_body`), |J| in place of |u|; on the lit side BEYOND |J_thrown| stands
-besides, for what comes to it later. The charge of expansions has the error of J.
+besides, for what comes to it later. The charge of expansions has the error of J in both of its slopes.
 
 Also here: surface divergence of a tangential field on a body, by its differences between points to either side.
 
@@ -117,7 +117,8 @@ def on_conductor(
     served, total = _by_expansions(fan, cross, k, electric, left, currents)
     magnetic = np.cross(total, cross.normals[:, :, None], axis=1)
     charge, turned = cross.divergence(total), cross.divergence(magnetic)
-    error = np.stack([one.error for one in served], axis=1)
+    # of two slopes, each of which errs as J does
+    error = np.sqrt(2) * np.stack([one.error for one in served], axis=1)
     return OnConductor(served, charge / (1j * k), error, -turned / k)
 
 

@@ -231,8 +231,8 @@ def slot_coupling(
     A slot of length dl and voltage V (its field integrated across the slot) is a magnetic moment V dl along the slot.
     Values are H along the receiving slot in the presence of the conductor, times the impedance of free space, per unit
     moment. On a plane this is twice ik (1 + grad grad/k^2) e^{ikr}/(4 pi r), including the near field. The mutual
-    admittance of two short slots is the value times both lengths over the impedance of free space; its sign depends on
-    the reference directions of the currents.
+    admittance of two short slots is minus the value times both lengths over the impedance of free space, with currents
+    counted into the ports.
 
     Parameters
     ----------

@@ -119,7 +119,7 @@ class ConductorCurrent(ArrayResult, PointData):
     charge : (...) or (..., 2) complex
         n.E = div J/(ik): surface charge density over the permittivity of free space, in units of the incident E.
     charge_error : (...) or (..., 2)
-        Error of the charge, as ``error``: equal to that of J for expansions, estimated apart for the equation.
+        Error of the charge, as ``error``: sqrt(2) times that of J for expansions, estimated apart for the equation.
     lit, creeping : as values
         Parts that add up to the values: the lit side's expansion, and creeping rays.
     incident_electric : (3,) or (3, 2) complex

@@ -33,7 +33,7 @@ def test_sphere_at_all_angles(ball, mie, rng, k, limit):
     # by differences between points, of which some stand across the edge of a beam
     assert np.quantile(charge[found.ok], 0.99) < limit
     assert np.mean(off[found.ok] <= found.error[found.ok]) > 0.95
-    assert np.mean(charge[found.ok] <= found.error[found.ok]) > 0.95
+    assert np.mean(charge[found.ok] <= found.charge_error[found.ok]) > 0.95
     assert np.median(found.error / off) < 10
 
 
