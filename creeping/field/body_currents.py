@@ -70,7 +70,7 @@ def surface_currents(
         Whether to solve the integral equation, as `creeping.solve` does. By default it is solved if that takes less
         than about 30 seconds and expansions fail or are doubtful: the body has edges, joints or tips, may reflect onto
         itself, or hides part of its shadow line; the admittance has steps; or the residual field inside the body
-        exceeds 2 % of the incident wave or cannot be measured. True allows up to 300 seconds.
+        exceeds 1 % of the incident wave or cannot be measured. True allows up to 300 seconds.
 
     Returns
     -------
@@ -103,8 +103,8 @@ def surface_currents(
     if solve:
         return _of_line(fan, asked_solution(*problem))
     # expansions know little of joints and tips, and nothing of edges
-    found = solution_for(*problem) if solve is None and is_piecewise(fan.body) else None
-    if found and (found.currents.extinction <= solving.POOR or not has_expansions(fan.body, boundary)):
+    found = solution_of_pieces(fan, k, boundary) if solve is None else None
+    if found:
         return _of_line(fan, found)
     if not has_expansions(fan.body, boundary):
         raise InvalidInputError(
@@ -128,6 +128,14 @@ def surface_currents(
     if facing and currents.boundary.kind in ("soft", "hard", "conductor"):
         currents.values[currents.lit] += currents.reflected_onto(lit.points, lit.normals)
     return currents
+
+
+def solution_of_pieces(fan: RayFan, wavenumber: float, boundary: BoundaryLike) -> Solved | None:
+    """The equation's solution for a body of pieces, unless it is poor and expansions are there to compare it with."""
+    found = solution_for(fan.body, fan.line.direction, wavenumber, boundary) if is_piecewise(fan.body) else None
+    if found and found.currents.extinction > solving.POOR and has_expansions(fan.body, boundary):
+        return None
+    return found
 
 
 def _of_line(fan: RayFan, solved: Solved) -> SurfaceCurrents:

@@ -32,11 +32,17 @@ import numpy as np
 from creeping._typing import ArrayLike
 from creeping.errors import SurfaceError
 from creeping.field.arguments import checked, checked_method, checked_plain, observers_of
-from creeping.field.body_currents import affordable, cached_currents, expected_nodes, has_expansions, surface_currents
+from creeping.field.body_currents import (
+    affordable,
+    cached_currents,
+    expected_nodes,
+    has_expansions,
+    solution_of_pieces,
+    surface_currents,
+)
 from creeping.field.boundary import BoundaryLike, scalar_boundaries
 from creeping.field.currents.far_sum import far_by_currents
 from creeping.field.currents.whole_body import SurfaceCurrents
-from creeping.field.equation.solving import solution_for
 from creeping.field.results.far_result import FarField
 from creeping.field.validity_range import validity
 from creeping.field.waves.far_geometry import far_geometry
@@ -151,7 +157,7 @@ def far_in_parts(
     currents: SurfaceCurrents | None = None
     if auto and piecewise:
         # edges diffract, and currents go across joints: the equation alone knows how
-        solved = solution_for(fan.body, fan.line.direction, k, boundary)
+        solved = solution_of_pieces(fan, k, boundary)
         currents = solved.currents if solved else None
     if not currents and (must or cheap):
         try:

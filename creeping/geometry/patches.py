@@ -18,7 +18,6 @@ Sources: Derivations, B14; [BT04].
 
 from dataclasses import dataclass, fields
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -206,7 +205,8 @@ def chordal(vertices: FloatArray, triangles: IntArray) -> float:
     return float(0.25 * np.sum(each.mean(axis=1) * twice) / np.sum(twice))
 
 
-class Triangles(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Triangles:
     """Triangles (t, 3) of vertices (n, 3), L; ``tessellated`` if they stand for curved faces."""
 
     vertices: FloatArray

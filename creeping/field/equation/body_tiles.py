@@ -173,9 +173,10 @@ def facet_tiles(
     cost, rule = _chosen(body, wavelength, rules)
     # large faces by squares of more than two nodes: what those lack at holes is more than at edges of cubes
     squares = tuple(rule for rule in rules if rule.squares and rule.p > FEW)
-    fewer = None if whole is None else _chosen(whole, wavelength, squares)
-    if whole is not None and fewer is not None and fewer[0] <= cost:
-        body, rule = whole, fewer[1]
+    if whole is not None:
+        other, fewest = _chosen(whole, wavelength, squares)
+        if other <= cost:
+            body, rule = whole, fewest
     if rule.squares:
         k = 2 * np.pi / wavelength
         made = tiles_for(_patches(body), k, side=rule.side, p=rule.p, cut=rule.cut, lacks=rule.lacks)
