@@ -73,3 +73,5 @@ from .shadow.line import shadow_line as shadow_line
 from .sweeping.echoes import backscatter as backscatter
 from .sweeping.echoes import bistatic as bistatic
 from .sweeping.run import sweep_directions as sweep_directions
+from .sweeping.t_matrices import orientation_averages as orientation_averages
+from .sweeping.t_matrices import t_matrices as t_matrices

@@ -104,7 +104,7 @@ def checked(wavenumber: float, order: int, body: Surface | None = None) -> float
     if isinstance(given, list | tuple) or (isinstance(given, np.ndarray) and given.ndim):
         raise InvalidInputError(
             f"wavenumber = {shown(wavenumber)} is not one number; for several frequencies call "
-            "creeping.backscatter, creeping.bistatic or creeping.sweep_directions"
+            "creeping.backscatter, creeping.sweep_directions, creeping.t_matrices or creeping.orientation_averages"
         )
     k = positive_number(wavenumber, "wavenumber")
     if not LEAST_WAVENUMBER <= k <= LARGEST_WAVENUMBER:

@@ -40,8 +40,8 @@ TASKS: dict[str, tuple[str, dict[str, str]]] = {
     "sweeps": (
         "Echoes, sweeps and T-matrices",
         {
-            "creeping": "backscatter bistatic Echo sweep_directions t_matrix TMatrix impulse_response ImpulseResponse "
-            "range_profile RangeProfile"
+            "creeping": "backscatter bistatic Echo sweep_directions t_matrix t_matrices "
+            "orientation_averages TMatrix impulse_response ImpulseResponse range_profile RangeProfile"
         },
     ),
     "antennas": (

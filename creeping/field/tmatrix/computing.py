@@ -171,12 +171,7 @@ def _computed(
     mirrors = mirrors_of(matrix, middle)
     plan = plan_for(load_on(tiles, FINER * k, kind), kind, degree, len(mirrors.images))
     what = f"the T-matrix of order {degree} at wavenumber {k:g} by {len(tiles.points)} nodes"
-    within_budget(plan.memory, what, "lower the wavenumber, or let creeping.solve serve for few incidences")
-    if plan.seconds > seconds:
-        raise InvalidInputError(
-            f"{what} takes about {plan.seconds:.2g} s, more than the {seconds:g} s that it may take; give seconds=, "
-            "or a lower wavenumber; for few incidences use creeping.solve or rays"
-        )
+    _refuse(plan, what, seconds)
     tell(f"{what}: about {plan.seconds:.2g} s and {plan.memory / 1e9:.2g} GB")
     # what it was begun with, whatever memory is free now
     direct = bool(keep("plan", lambda: {"direct": np.array([plan.direct])})["direct"][0])
@@ -236,6 +231,21 @@ def expected(body: Surface, wavenumber: float, boundary: BoundaryLike) -> Plan:
         1 if kind.varies else memo(body, f"images of a {'vector' if kind.kind == 'conductor' else 'scalar'}", parts)
     )
     return plan_for(load_of(body, FINER * wavenumber, kind), kind, order_for(wavenumber * radius), images)
+
+
+def refuse(body: Surface, wavenumber: float, boundary: BoundaryLike, order: int | None, seconds: float) -> None:
+    """Refuse a T-matrix that takes too much by `expected`, before those of lower wavenumbers are computed."""
+    if order is None:
+        _refuse(expected(body, wavenumber, boundary), f"the T-matrix at wavenumber {wavenumber:g}", seconds)
+
+
+def _refuse(plan: Plan, what: str, seconds: float) -> None:
+    within_budget(plan.memory, what, "lower the wavenumber, or let creeping.solve serve for few incidences")
+    if plan.seconds > seconds:
+        raise InvalidInputError(
+            f"{what} takes about {plan.seconds:.2g} s, more than the {seconds:g} s that it may take; give seconds=, "
+            "or a lower wavenumber; for few incidences use creeping.solve or rays"
+        )
 
 
 def pays(body: Surface, wavenumber: float, boundary: BoundaryLike, incidences: int) -> bool:

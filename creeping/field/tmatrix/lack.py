@@ -97,6 +97,11 @@ class Lack:
         """Error of f, L, in the mean."""
         return float(LEVEL * np.hypot(self.known, LEAST) * self.mean)
 
+    @property
+    def backward(self) -> float:
+        """Error of backscatter, L, in the mean over incidences."""
+        return float(BACKWARD * np.hypot(self.reciprocity * self.mean, self._least(ALONE)))
+
     def error_of(self, own: FloatArray, d: FloatArray, r: FloatArray, *, pairs: bool) -> FloatArray:
         """Error of f, L, of |X(d, r)| (..., c, c), for incidences d and directions r (m, 3)."""
         one, other = self.along(d), self.along(-r)

@@ -60,16 +60,24 @@ class Averages(NamedTuple):
     ----------
     backscattering, scattering, extinction : float
         Backscattering is 4 pi |f(d, -d)|^2, summed over both scattered polarisations for a conductor.
+    error : float
+        Error of the backscattering.
     """
 
     backscattering: float
     scattering: float
     extinction: float
+    error: float
 
     @property
     def target_strength(self) -> float:
         """10 log10(backscattering/4 pi), dB relative to L."""
         return float(10 * np.log10(self.backscattering / (4 * np.pi)))
+
+    @property
+    def target_strength_error(self) -> float:
+        """Error of the target strength, dB."""
+        return float(10 * np.log10(1 + self.error / self.backscattering))
 
 
 def far_table(directions: FloatArray, order: int, *, vector: bool) -> ComplexArray:

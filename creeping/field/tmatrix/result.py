@@ -312,8 +312,15 @@ class TMatrix:
         # |f|^2 is of degree 4L: Gauss's rule over cos theta, Parseval's sum over phi
         u, w = np.polynomial.legendre.leggauss(2 * L + 1)
         series = backward_series(T, k, np.arccos(u), L, vector=self.vector)
-        mean = 0.5 * float(np.sum(w * np.sum(np.abs(series) ** 2, axis=(1, 2, 3)))) / len(series[0])
-        return Averages(4 * np.pi * mean, share * float(np.linalg.norm(T)) ** 2, -share * float(np.trace(T).real))
+        c = len(series[0])
+        mean = 0.5 * float(np.sum(w * np.sum(np.abs(series) ** 2, axis=(1, 2, 3)))) / c
+        return Averages(
+            backscattering=4 * np.pi * mean,
+            scattering=share * float(np.linalg.norm(T)) ** 2,
+            extinction=-share * float(np.trace(T).real),
+            # of components that err in phase with the field
+            error=4 * np.pi * float((np.sqrt(mean) + np.sqrt(c) * self._lack.backward) ** 2 - mean),
+        )
 
     # --- other places
 

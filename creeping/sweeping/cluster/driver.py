@@ -101,6 +101,31 @@ def fill_on(
             client.unregister_worker_plugin(name)
 
 
+def in_order(client: Any, work: Callable[..., Any], asked: list[dict[str, Any]]) -> Iterator[Any]:
+    """Results of calls with the options ``asked``, computed on a cluster, in their order.
+
+    Raises
+    ------
+    CreepingError
+        By a call, or if what is called cannot be sent or its worker dies.
+    """
+    try:
+        futures = [client.submit(work, **options, pure=False) for options in asked]
+    except (TypeError, AttributeError) as error:
+        raise CreepingError(f"the body cannot be sent to workers ({error}); compute in one process") from error
+    try:
+        while futures:
+            result = futures[0].result()
+            # what was given is not kept by the workers
+            futures.pop(0)
+            yield result
+    except (distributed.KilledWorker, distributed.client.FutureCancelledError) as error:
+        raise CreepingError(f"the cluster gave up a task ({error}); with a store what is done is kept") from error
+    finally:
+        with suppress(Exception):
+            client.cancel(futures, force=True)
+
+
 @contextmanager
 def connected(address: str) -> Iterator[Any]:
     """Client of the scheduler at an address.
