@@ -48,8 +48,8 @@ class Drawn(Shown):
             the last value of a cell, and ``.figure.savefig(path)`` writes it. For a window, give axes of pyplot.
         **options
             ``legend=True`` adds a legend to given axes; a new figure has one. The other options depend on the type of
-            the result; see `line_plots`, `far_cuts`, `plane_pictures`, `coupling_pictures` and `echo_pictures` of
-            `creeping.plotting`:
+            the result; see `line_plots`, `far_cuts`, `plane_pictures`, `coupling_pictures`, `echo_pictures` and
+            `t_matrix_pictures` of `creeping.plotting`:
 
             - `ShadowLine`, `ShadowCurve`, `RayFan` (``plot_line``): ``kind="parameters"``, the plane of (theta, phi) in
               degrees, or ``kind="3d"``, which 3-D axes imply; ``curves=``, iso-phase curves to draw as well;
@@ -62,6 +62,8 @@ class Drawn(Shown):
             - `PhaseMap` (``plot_growth``): ``tolerance=``.
             - `Coupling` (``plot_coupling``), `SourcePattern` (``plot_pattern``), `Echo` (``plot_echo``): ``span=``;
               of an echo over angle and frequency ``channel=``.
+            - `TMatrix` (``plot_t_matrix``): ``kind="backscatter"``, a map of all directions, or ``"waves"``, the matrix
+              by degrees; ``component=``, ``span=``.
             - `ImpulseResponse` (``plot_impulse``), `RangeProfile` (``plot_profile``): ``start=``, ``end=``, ``span=``.
 
         Returns

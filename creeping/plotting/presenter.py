@@ -18,7 +18,7 @@ from creeping.files.polylines import polydata
 from creeping.files.tables import angles_of
 from creeping.geometry.checks import UNKNOWN, unit_of
 from creeping.geometry.incident import Incident, PointSource, incident_of_row
-from creeping.plotting import coupling_pictures, echo_pictures, far_cuts, line_plots, plane_pictures
+from creeping.plotting import coupling_pictures, echo_pictures, far_cuts, line_plots, plane_pictures, t_matrix_pictures
 
 if TYPE_CHECKING:
     from creeping.field.cut_result import FieldCut
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from creeping.field.results.impulse import ImpulseResponse, RangeProfile
     from creeping.field.results.point_result import PointData
     from creeping.field.sources import SourcePattern
+    from creeping.field.tmatrix.result import TMatrix
     from creeping.geodesics.direct_flow import DirectFlow
     from creeping.geodesics.integrator import ErrorEstimate
     from creeping.phaseflow.phase_map import PhaseMap
@@ -92,6 +93,7 @@ def _shown(result: object, way: str) -> Callable[..., Any]:
         "ImpulseResponse": Ways(of_impulse, echo_pictures.plot_impulse),
         "RangeProfile": Ways(of_profile, echo_pictures.plot_profile),
         "Echo": Ways(of_echo, echo_pictures.plot_echo),
+        "TMatrix": Ways(of_t_matrix, t_matrix_pictures.plot_t_matrix),
     }
     known: dict[str, Callable[..., Any]] = {
         name: one for name, row in ways.items() if (one := getattr(row, way)) is not None
@@ -340,6 +342,21 @@ def of_echo(found: "Echo") -> Facts:
         yield "error", f"{told['error_db_median']:.2g} dB in the median, {told['error_db_95']:.2g} dB at 95 of 100"
     yield "unresolved", f"{told['unresolved']} of {told['values']} values"
     yield "served by currents", f"{told['by_currents']} of {told['values']}, else by {told['otherwise_by']}"
+
+
+def of_t_matrix(T: "TMatrix") -> Facts:
+    """Facts of a T-matrix."""
+    yield "body", T.body[:200] or "unknown"
+    yield from _waved(T, T.unit)
+    yield "order", f"{T.order}, {len(T.matrix)} waves"
+    yield "centre", f"({', '.join(f'{x:.6g}' for x in T.center)}) {T.unit}"
+    averages = T.orientation_average()
+    for name, value in zip(averages._fields[:3], averages, strict=False):
+        yield f"mean {name}", f"{value:.6g} {T.unit}²"
+    yield "reciprocity", f"{T.reciprocity:.1e}"
+    if not T.absorbing:
+        yield "unitarity", f"{T.unitarity:.1e}"
+    yield "error of f", f"{T.error:.2g} {T.unit}"
 
 
 def _waved(found: Any, unit: str) -> Facts:

@@ -143,7 +143,7 @@ def orientation_averages(
     >>> import creeping as cr, scatterers as sc
     >>> ds = cr.orientation_averages(sc.Ellipsoid(0.5, 0.3, 0.2), wavenumbers=[1.0, 4.0], boundary="hard")
     >>> ds.target_strength.round(1).values.tolist()
-    [-21.1, -16.8]
+    [-32.2, -15.6]
     """
     library = require("xarray")
     rows, k = [], []

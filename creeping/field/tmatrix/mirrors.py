@@ -87,7 +87,9 @@ def _image(matrix: Matrix, x: FloatArray, axis: int) -> tuple[IntArray, FloatArr
     size = float(np.max(np.abs(x)))
     away, at = cKDTree(x).query(x * flip)
     nodes, root = matrix.nodes, matrix.root
-    if np.max(away) > SAME * size or np.min(np.abs(x[:, axis])) < 1e3 * SAME * size:
+    number = np.arange(len(x))
+    # a node on the plane is its own image
+    if np.max(away) > SAME * size or np.any(at == number) or np.any(at[at] != number):
         return None
     if np.max(np.abs(root[at] / root - 1)) > SAME or np.max(np.abs(nodes.normals[at] - nodes.normals * flip)) > SAME:
         return None

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from creeping._presenting import Drawn
 from creeping._typing import ArrayLike, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import UNRESOLVED, observers_of
@@ -52,7 +53,7 @@ VALUE = 80.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TMatrix:
+class TMatrix(Drawn):
     """T-matrix of a body: scattered spherical waves for each incident spherical wave about a centre.
 
     Definition and order of the waves are those of `creeping.field.tmatrix.spherical_waves`, treams and acoustotreams.

@@ -103,6 +103,15 @@ def test_mirrors_change_nothing(boundary):
     assert both[0].extinction(x) < 1e-3 and both[1].extinction(x) < 1e-3
 
 
+def test_nodes_of_a_tip_may_be_next_to_a_plane():
+    body, k = sc.Almond(1.0), 20.0
+    kind = scalar_boundaries("pec")[0]
+    matrix = Matrix(body_tiles(body, k, kind), k, kind)
+    planes = mirrors_of(matrix, np.mean(body.bounds, axis=0))
+    assert np.abs(matrix.nodes.points[:, 2]).min() < 1e-5 and planes.axes == (1, 2)
+    assert sorted(planes.images.ravel()) == list(range(len(matrix.root)))
+
+
 def test_a_centre_off_the_planes_and_an_admittance_that_varies_have_no_mirrors():
     body = sc.Sphere(0.4)
     kind = scalar_boundaries("hard")[0]

@@ -149,22 +149,3 @@ def test_acoustotreams_takes_it(tmp_path):
     basis = acoustotreams.ScalarSphericalWaveBasis.default(T.order)
     there = acoustotreams.AcousticTMatrix(T.matrix, k0=2.0, basis=basis)
     assert there.xs_sca_avg == pytest.approx(T.orientation_average().scattering, rel=1e-9)
-
-
-@pytest.mark.slow
-def test_a_cluster_by_acoustotreams_is_two_bodies_solved_directly():
-    acoustotreams = pytest.importorskip("acoustotreams", exc_type=ImportError)
-    k, at = 3.0, np.array([[0, 0, -0.8], [0.1, 0, 0.9]])
-    parts = [sc.Ellipsoid(0.5, 0.4, 0.3), sc.Cylinder(0.4, 0.6)]
-    order = 9
-    each = [cr.t_matrix(body, wavenumber=k, boundary="hard", order=order) for body in parts]
-    basis = acoustotreams.ScalarSphericalWaveBasis.default(order)
-    made = [acoustotreams.AcousticTMatrix(T.matrix, k0=k, basis=basis) for T in each]
-    both = acoustotreams.AcousticTMatrix.cluster(made, at).interaction.solve()
-    d, r = np.array([[0.48, 0.6, 0.64]]), cr.fibonacci_directions(20)
-    waves = [T.translate(v) for T, v in zip(each, at, strict=True)]
-    incoming = np.concatenate([T._received(d)[0, 0] for T in waves])
-    outgoing = np.asarray(both) @ incoming
-    found = sum(T._sent(r)[:, 0] @ p for T, p in zip(waves, np.split(outgoing, 2), strict=True))
-    want = cr.solve(sc.Bodies(parts, at=at), d, wavenumber=k, boundary="hard").far_field(r).total
-    assert np.abs(found - want).max() < 1e-4 * np.abs(want).max()
