@@ -72,6 +72,6 @@ from .shadow.line import ShadowLine as ShadowLine
 from .shadow.line import shadow_line as shadow_line
 from .sweeping.echoes import backscatter as backscatter
 from .sweeping.echoes import bistatic as bistatic
+from .sweeping.over_wavenumbers import orientation_averages as orientation_averages
+from .sweeping.over_wavenumbers import t_matrices as t_matrices
 from .sweeping.run import sweep_directions as sweep_directions
-from .sweeping.t_matrices import orientation_averages as orientation_averages
-from .sweeping.t_matrices import t_matrices as t_matrices

@@ -5,8 +5,9 @@ they are scattered, so that with the nodes i of one part of space and their imag
 
     A_chi[i, j] = sum_g chi(g) s_g(j) A[i, gj],   u(gi) = chi(g) s_g(i) u(i)
 
-are 2^s equations of n/2^s unknowns: a matrix of 8 such blocks is factorised in a 64th of the time. s is 1 of scalar
-fields; of J, in components along tangents, whether these have the image's sign: J(P x) = chi P J(x).
+are 2^s equations of n/2^s unknowns: a matrix of 8 such blocks is factorised in a 64th of the time. A node on a plane is
+an image of itself, has that share of its weight, and is 0 in odd fields. s is 1 of scalar fields; of J, in components
+along tangents, whether these have the image's sign: J(P x) = chi P J(x).
 
     psi_lm(P x):   x -> -x   psi_l-m,    y -> -y   (-1)^m psi_l-m,    z -> -z   (-1)^(l+m) psi_lm
 
@@ -35,11 +36,11 @@ class Mirrors(NamedTuple):
     ----------
     axes : tuple of int
         Normals of the planes: 0, 1, 2.
-    part : (n / 2^s,)
-        Nodes of which all others are images.
-    images : (2^s, n / 2^s)
+    part : (m,)
+        Nodes of which all others are images: n / 2^s, and more where nodes on a plane are their own images.
+    images : (2^s, m)
         Numbers of the images, in the order of `product` over axes, not mirrored first.
-    signs : (2^s, n / 2^s, c)
+    signs : (2^s, m, c)
         Signs of the images of tangents.
     """
 
@@ -54,9 +55,14 @@ class Mirrors(NamedTuple):
         odd = np.array(list(product((0, 1), repeat=len(self.axes)))).reshape(2 ** len(self.axes), -1)
         return np.asarray((-1.0) ** (odd @ odd.T))
 
+    @property
+    def times(self) -> IntArray:
+        """How often each node of the part is among its own images (m,)."""
+        return np.asarray(np.sum(self.images == self.part, axis=0))
+
 
 def mirrors_of(matrix: Matrix, center: FloatArray) -> Mirrors:
-    """Mirrors that the nodes of an equation have: none where nodes are on a plane, or the admittance varies."""
+    """Mirrors that the nodes of an equation have: none where the admittance varies."""
     n, c = len(matrix.root), matrix.columns
     x = matrix.nodes.points - center
     found = {} if matrix.boundary.varies else {axis: _image(matrix, x, axis) for axis in range(3)}
@@ -68,7 +74,7 @@ def mirrors_of(matrix: Matrix, center: FloatArray) -> Mirrors:
         images = np.stack([images, at[images]], axis=1).reshape(-1, n)
         both = turned[images[::2]] * signs
         signs = np.stack([signs, both], axis=1).reshape(-1, n, c)
-        part &= x[:, axis] > 0
+        part &= (x[:, axis] > 0) | (at == np.arange(n))
     return Mirrors(tuple(steps), np.flatnonzero(part), images[:, part], signs[:, part])
 
 
@@ -87,9 +93,7 @@ def _image(matrix: Matrix, x: FloatArray, axis: int) -> tuple[IntArray, FloatArr
     size = float(np.max(np.abs(x)))
     away, at = cKDTree(x).query(x * flip)
     nodes, root = matrix.nodes, matrix.root
-    number = np.arange(len(x))
-    # a node on the plane is its own image
-    if np.max(away) > SAME * size or np.any(at == number) or np.any(at[at] != number):
+    if np.max(away) > SAME * size or np.any(at[at] != np.arange(len(x))):
         return None
     if np.max(np.abs(root[at] / root - 1)) > SAME or np.max(np.abs(nodes.normals[at] - nodes.normals * flip)) > SAME:
         return None

@@ -68,7 +68,9 @@ class SolvedWaves:
         # nodes of the part with points beneath them, and which these are
         self._above, self._beneath = np.flatnonzero(under[part] >= 0), under[part][under[part] >= 0]
         own, beneath = self._waves_at(matrix.nodes.part(part)), self._waves_at(matrix.inner.part(self._beneath))
-        own.sent[:] *= np.repeat(matrix.root[part] ** 2, c)[:, None]
+        # of nodes that are their own images the share that they have of their weight
+        self._root = matrix.root[part] / np.sqrt(self._mirrors.times)
+        own.sent[:] *= np.repeat(self._root**2, c)[:, None]
         (right, sent), (self._size, size) = zip(*(_scaled(lane) for lane in own), strict=True)
         given = right, _cleared(beneath.right / self._size)
         T = np.zeros((len(size), len(size)), dtype=complex)
@@ -112,8 +114,8 @@ class SolvedWaves:
         """Values at the nodes of the part (c m, waves) for the waves of each parity, by LAPACK."""
         from scipy.linalg import lu_factor, lu_solve
 
-        matrix, c = self._of, self._of.columns
-        root = np.repeat(matrix.root[self._mirrors.part], c).astype(np.float32)[:, None]
+        c = self._of.columns
+        root = np.repeat(self._root, c).astype(np.float32)[:, None]
         B = given[0] * root
         above = (c * self._above[:, None] + np.arange(c)).ravel()
         B[above] -= 1j * given[1] * root[above]
@@ -146,7 +148,8 @@ class SolvedWaves:
         images = mirrors.images
         m = c * images.shape[1]
         columns = (c * images[:, :, None] + np.arange(c)).reshape(len(images), -1)
-        signs = mirrors.signs.reshape(len(images), -1).astype(np.float32)
+        signs = mirrors.signs / np.sqrt(mirrors.times)[:, None]
+        signs = signs.reshape(len(images), -1).astype(np.float32)
         out = np.zeros((len(images), m, m), dtype=np.complex64)
 
         def add(at: Any, rows: np.ndarray, factor: complex) -> None:
@@ -165,7 +168,7 @@ class SolvedWaves:
         own = matrix.nodes.part(mirrors.part)
         for first in range(0, len(mirrors.part), BLOCK):
             at = slice(first, first + BLOCK)
-            rows = matrix.rows(own.part(at), matrix.root[mirrors.part[at]])
+            rows = matrix.rows(own.part(at), self._root[at])
             add(slice(c * first, c * (first + BLOCK)), rows, 1.0 if matrix.soft else -1.0)
         for block in out:
             if matrix.soft:
@@ -173,7 +176,7 @@ class SolvedWaves:
             block[np.diag_indices(m)] += 1.0
         for first in range(0, len(self._above), BLOCK):
             above, beneath = (lane[first : first + BLOCK] for lane in (self._above, self._beneath))
-            under, root = matrix.inner.part(beneath), matrix.root[mirrors.part[above]]
+            under, root = matrix.inner.part(beneath), self._root[above]
             rows = matrix.rows(under, root, "slope" if matrix.soft else "double")
             add((c * above[:, None] + np.arange(c)).ravel(), rows, -1j if matrix.soft else 1j)
         return out

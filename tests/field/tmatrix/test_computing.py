@@ -87,20 +87,33 @@ def test_far_fields_of_conductors_are_those_of_solutions(body):
     assert np.abs(found - want).max() < 2e-4 * np.abs(T.bistatic(D, D, pairs=True).values).max()
 
 
-@pytest.mark.parametrize("boundary", ["soft", pytest.param("pec", marks=pytest.mark.slow)])
-def test_mirrors_change_nothing(boundary):
-    body, k = sc.Ellipsoid(0.5, 0.4, 0.3), 2.0
+@pytest.mark.parametrize(
+    ("body", "times", "boundary"),
+    [
+        (sc.Ellipsoid(0.5, 0.4, 0.3), {1}, "soft"),
+        pytest.param(sc.Ellipsoid(0.5, 0.4, 0.3), {1}, "pec", marks=pytest.mark.slow),
+        # of tiles with nodes on the planes
+        (sc.Cylinder(0.5, 1.0), {1, 2}, "hard"),
+        pytest.param(sc.Cylinder(0.5, 1.0), {1, 2}, "soft", marks=pytest.mark.slow),
+        pytest.param(sc.Cylinder(0.5, 1.0), {1, 2}, "pec", marks=pytest.mark.slow),
+    ],
+)
+def test_mirrors_change_nothing(body, times, boundary):
+    k = 2.0
     kinds = scalar_boundaries(boundary)
     kind = computing.CONDUCTOR if len(kinds) == 2 else kinds[0]
     tiles = body_tiles(body, k, kind)
     matrix = Matrix(tiles, k, kind)
     planes = mirrors_of(matrix, np.zeros(3))
-    assert planes.axes == (0, 1, 2) and len(planes.images) == 8
-    assert sorted(planes.images.ravel()) == list(range(len(tiles.points)))
+    assert planes.axes == (0, 1, 2) and len(planes.images) == 8 and set(planes.times) == times
+    assert set(planes.images.ravel()) == set(range(len(tiles.points)))
+    assert np.sum(8 / planes.times) == len(tiles.points)
     both = [SolvedWaves(matrix, np.zeros(3), 4, some, print, direct=True) for some in (planes, no_mirrors(matrix))]
     assert np.abs(both[0].T - both[1].T).max() < 2e-6
     x = inside_points(body, tiles, 2 * np.pi / k)
-    assert both[0].extinction(x) < 1e-3 and both[1].extinction(x) < 1e-3
+    left = [one.extinction(x) for one in both]
+    # rounding is single, and at the edge of a conductor more is left
+    assert left[0] == pytest.approx(left[1], rel=1e-2, abs=2e-5) and left[0] < 3e-3
 
 
 def test_nodes_of_a_tip_may_be_next_to_a_plane():
