@@ -21,6 +21,7 @@ from creeping.field.far import far_field
 from creeping.field.on_body import ray_envelope
 from creeping.field.results.comparison import decibels
 from creeping.field.results.far_result import FarField
+from creeping.field.tmatrix.computing import expected
 from creeping.field.validity_range import Validity, validity
 from creeping.geodesics.equations import natural_horizon
 from creeping.geometry.directions import directions_from_angles
@@ -33,6 +34,8 @@ from creeping.rays.fan import RayFan, end_error, launch
 from creeping.rays.isophase import IsoPhaseCurve, iso_phase_curves
 from creeping.rays.transport import Flow
 from creeping.shadow.line import ShadowLine, shadow_line
+from creeping.storage.memory import budget
+from creeping.sweeping.t_matrix_fields import kept_t_matrix, known_t_matrix
 
 MOST_STEPS = 192
 """Of a ray."""
@@ -175,6 +178,8 @@ def outline(mesh: Triangulation, normals: FloatArray, direction: FloatArray) -> 
 
 CUT_STEP = 2.0
 """Of the far-field cut, degrees."""
+PATIENCE = 20.0
+"""Seconds at most of a T-matrix that is made while the hand rests."""
 BLOCK = 512
 """Points of the body at a time: a newer request waits for no more."""
 IsStale = Callable[[], bool]
@@ -234,13 +239,33 @@ def refined_view(flow: Flow, frame: Preview, vertices: FloatArray, stale: IsStal
     levels, wave = _on_body(fan, request, vertices, stale)
     if stale():
         return None
-    return Refined(request, drawn, line, fan, levels, angles, far_cut(fan, request, angles), wave)
+    far, exact = far_cut(fan, request, angles), matrix_cut(body, request, angles)
+    # creeping and reflected parts are those of rays
+    far = far if exact is None else replace(exact, parts=far.parts)
+    return Refined(request, drawn, line, fan, levels, angles, far, wave)
 
 
 def far_cut(fan: RayFan, request: ViewRequest, angles: FloatArray, method: str = "auto") -> FarField:
     """Far field of the cut at theta (m,), degrees."""
     directions = cut_directions(angles, request.cut)
     return far_field(fan, directions, wavenumber=request.wavenumber, boundary=request.kind, method=method)
+
+
+def matrix_cut(body: Surface, request: ViewRequest, angles: FloatArray) -> FarField | None:
+    """The same by the T-matrix, of any incidence in milliseconds; None where none was made of this wave."""
+    T = known_t_matrix(body, request.wavenumber, request.kind)
+    return None if T is None else T.far_field(request.direction, cut_directions(angles, request.cut))
+
+
+def made_matrix(body: Surface, request: ViewRequest) -> bool:
+    """Make the T-matrix of a wave that has none, if it takes no more than `PATIENCE`; whether it was made."""
+    if speed_of(body) is not None or known_t_matrix(body, request.wavenumber, request.kind) is not None:
+        return False
+    plan = expected(body, request.wavenumber, request.kind)
+    if plan.seconds > PATIENCE or plan.memory > budget():
+        return False
+    kept_t_matrix(body, request.wavenumber, request.kind)
+    return True
 
 
 def _on_body(

@@ -1,6 +1,8 @@
-"""The page itself: controls, two workers, and what the server lets in.
+"""The page itself: controls, workers, and what the server lets in.
 
-One worker follows the hand, from the latest request to the preview; another follows up when no newer request has come.
+One worker follows the hand, from the latest request to the preview, another follows with the cut of the far field, and
+a third follows up when no newer request has come. When the hand has rested a fourth makes the T-matrix of the wave, by
+which the cut of every later incidence comes at once.
 The server listens on the loopback address, behind `creeping.explorer.door`.
 
 Also here: the latest request and nothing else: a queue of one place, so that work does not pile up behind a hand that
@@ -28,7 +30,17 @@ import viser
 from creeping._typing import Any
 from creeping.errors import CreepingError
 from creeping.explorer.door import Door
-from creeping.explorer.frames import Preview, Refined, far_cut, preview_of, refined_view, step_of
+from creeping.explorer.frames import (
+    CUT_STEP,
+    Preview,
+    Refined,
+    far_cut,
+    made_matrix,
+    matrix_cut,
+    preview_of,
+    refined_view,
+    step_of,
+)
 from creeping.explorer.panel import cut_svg, legend, plane_svg, preview_plane_svg, preview_text, refined_text, wave_note
 from creeping.explorer.request import BOUNDARIES, RAYS, ViewRequest, angles, wave_scale
 from creeping.explorer.scene import DrawnBody, Paint, Scene, turned
@@ -115,6 +127,7 @@ class Explorer:
         self._requests: Latest[ViewRequest] = Latest()
         self._frames: Latest[tuple[Preview, int]] = Latest()
         self._cuts: Latest[tuple[Preview, int]] = Latest()
+        self._waves: Latest[tuple[Preview, int]] = Latest()
         self.server = LocalServer(port, name)
         try:
             self.scene = Scene(self.server, self.model)
@@ -124,7 +137,8 @@ class Explorer:
         except BaseException:
             self.server.stop()
             raise
-        self._workers = [Thread(target=work, daemon=True) for work in (self._preview, self._follow, self._refine)]
+        jobs = self._preview, self._follow, self._refine, self._solve
+        self._workers = [Thread(target=work, daemon=True) for work in jobs]
         for worker in self._workers:
             worker.start()
         self._requests.put(request)
@@ -147,7 +161,7 @@ class Explorer:
 
     def close(self) -> None:
         """Stop the workers and the server."""
-        for queue in (self._requests, self._frames, self._cuts):
+        for queue in (self._requests, self._frames, self._cuts, self._waves):
             queue.close()
         for worker in self._workers:
             worker.join(timeout=5.0)
@@ -290,19 +304,23 @@ class Explorer:
 
     def _follow(self) -> None:
         """Let the far-field cut follow the frames, at a pace of its own: it takes longer than they do."""
-        angles = np.arange(-180.0, 180.0 + FOLLOWING / 2, FOLLOWING)
         while (taken := self._cuts.take()) is not None:
             (frame, number), _ = taken
-            request, began = frame.request, time.perf_counter()
+            request, began, pace = frame.request, time.perf_counter(), PACE
             try:
-                # of more nodes a cut takes more than half a second, and waits until the hand rests
-                if speed_of(self.flow.body) is not None or not len(frame.fan.points):
-                    continue
-                if expected_nodes(frame.fan, request.wavenumber) >= 60_000:
-                    continue
-                # currents of a body that faces itself take seconds
-                method = "auto" if convex(frame.fan) else "rays"
-                cut = cut_svg(request, angles, far_cut(frame.fan, request, angles, method))
+                angles = np.arange(-180.0, 180.0 + CUT_STEP / 2, CUT_STEP)
+                if (exact := matrix_cut(self.flow.body, request, angles)) is not None:
+                    cut, pace = cut_svg(request, angles, exact), 0.0
+                else:
+                    # of more nodes a cut takes more than half a second, and waits until the hand rests
+                    if speed_of(self.flow.body) is not None or not len(frame.fan.points):
+                        continue
+                    if expected_nodes(frame.fan, request.wavenumber) >= 60_000:
+                        continue
+                    # currents of a body that faces itself take seconds
+                    method = "auto" if convex(frame.fan) else "rays"
+                    angles = np.arange(-180.0, 180.0 + FOLLOWING / 2, FOLLOWING)
+                    cut = cut_svg(request, angles, far_cut(frame.fan, request, angles, method))
                 self.cut_seconds.append(time.perf_counter() - began)
                 with self._drawing:
                     # the refined cut of this request, if it came first, is the better one
@@ -314,7 +332,15 @@ class Explorer:
             except Exception as error:
                 self.status.content = error_text(error)
             # the hand comes first: as long a rest as the work took
-            time.sleep(max(PACE, time.perf_counter() - began))
+            time.sleep(max(pace, time.perf_counter() - began))
+
+    def _solve(self) -> None:
+        """Make the T-matrix of the wave on which the hand has rested, and follow up once more by it."""
+        while (taken := self._waves.take()) is not None:
+            (frame, number), _ = taken
+            with suppress(CreepingError):
+                if made_matrix(self.flow.body, frame.request):
+                    self._frames.put((frame, number))
 
     def _refine(self) -> None:
         """Follow up when the hand rests."""
@@ -337,6 +363,7 @@ class Explorer:
                         self._refined, self._found = number, found
                         self.scene.refine(found, self._body_paint(found))
                         self.found.content, self.plane.content, self.cut.content = text, plane, cut
+                        self._waves.put((frame, number))
             except Exception as error:
                 with self._drawing:
                     self.found.content, self.plane.content, self.cut.content = error_text(error), "", ""

@@ -17,6 +17,7 @@ from creeping.explorer.request import ViewRequest, far_levels, far_name, wave_te
 from creeping.explorer.wave import ENDED, FIELD_COLOURS, LEVEL_COLOURS, WAVE_COLOURS, ColourTable, Span
 from creeping.field.results.comparison import shown_range
 from creeping.field.results.far_result import FarField
+from creeping.field.tmatrix.result import METHOD
 from creeping.field.validity_range import WITHIN, Validity, validity_words
 from creeping.geometry.checks import unit_of
 from creeping.plotting._strokes import RAY_COLOUR, STATUS_COLOURS, line_pieces
@@ -167,9 +168,9 @@ def cut_svg(request: ViewRequest, angles: FloatArray, far: FarField | None) -> s
         parts.append(f'<text x="{across + 19:.0f}" y="{TOP + 11}" {_TEXT}>{name}</text>')
         across += 80
     ticks = np.arange(low, high + 1, 20.0 if high - low > 40 else 10.0)
-    frame = axes.frame(
-        range(-180, 181, 60), ticks.tolist(), f"theta (degrees), phi = {request.cut:g}", far_name(request)
-    )
+    by = ", by the T-matrix" * (far.method.tolist()[:1] == [METHOD])
+    across_name = f"theta (degrees), phi = {request.cut:g}{by}"
+    frame = axes.frame(range(-180, 181, 60), ticks.tolist(), across_name, far_name(request))
     return _picture("cut", axes.height, [*parts, frame])
 
 

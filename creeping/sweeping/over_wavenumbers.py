@@ -77,7 +77,7 @@ def t_matrices(
     --------
     >>> import creeping as cr, scatterers as sc
     >>> [T.order for T in cr.t_matrices(sc.Sphere(), wavenumbers=[1.0, 2.0], boundary="soft")]
-    [4, 6]
+    [5, 6]
     """
     numbers = np.atleast_1d(np.asarray(wavenumbers))
     k = [checked(value, 2, body) for value in numbers.tolist()]

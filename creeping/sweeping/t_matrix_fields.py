@@ -76,6 +76,12 @@ class TMatrixSweeper:
         return out
 
 
+def known_t_matrix(body: Surface, wavenumber: float, boundary: BoundaryLike) -> TMatrix | None:
+    """The T-matrix of a body that `kept_t_matrix` has made, if it is still there."""
+    known: dict[Any, TMatrix] = memo(body, "T-matrices", dict)
+    return known.get((wavenumber, boundary))
+
+
 def kept_t_matrix(body: Surface, wavenumber: float, boundary: BoundaryLike, store: Path | None = None) -> TMatrix:
     """The T-matrix of a body, made once while there is room for it."""
     known: dict[Any, TMatrix] = memo(body, "T-matrices", dict)

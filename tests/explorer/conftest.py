@@ -42,8 +42,9 @@ FLAGS = (
 
 @pytest.fixture
 def coarse(monkeypatch):
-    """Bodies of the page in fewer triangles."""
+    """Bodies of the page in fewer triangles, and no T-matrices."""
     monkeypatch.setattr("creeping.explorer.scene.CELLS", 20)
+    monkeypatch.setattr("creeping.explorer.frames.PATIENCE", 0.0)
 
 
 class Browser:

@@ -7,7 +7,15 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.explorer.frames import cut_directions, outline, preview_of, refined_view, step_of
+from creeping.explorer.frames import (
+    cut_directions,
+    made_matrix,
+    matrix_cut,
+    outline,
+    preview_of,
+    refined_view,
+    step_of,
+)
 from creeping.explorer.panel import _broken, cut_svg, legend, plane_svg, preview_plane_svg, preview_text, refined_text
 from creeping.explorer.request import ViewRequest, far_levels, wave_scale, wave_text
 from creeping.explorer.wave import ENDED, FIELD_COLOURS, field_colours, fitted_span
@@ -152,3 +160,24 @@ def test_colours_are_of_the_range_and_lines_break_where_an_angle_jumps():
     phi = np.radians([150.0, 170.0, 179.0, -170.0, -150.0, np.nan])
     pieces = _broken(np.stack([np.full(6, 1.0), phi], axis=1)[None])
     assert [len(piece) for piece in pieces] == [3, 2] and all(np.isfinite(piece).all() for piece in pieces)
+
+
+def test_the_cut_is_that_of_the_t_matrix_where_one_was_made():
+    body, request = sc.Ellipsoid(0.6, 0.5, 0.4), REQUEST.changed(wavenumber=2.0)
+    angles = np.array([-120.0, 0.0, 35.0])
+    assert matrix_cut(body, request, angles) is None
+    assert made_matrix(body, request) and not made_matrix(body, request)
+    found = matrix_cut(body, request, angles)
+    solution = cr.solve(body, request.direction, wavenumber=2.0, boundary="hard")
+    want = solution.far_field(cut_directions(angles, request.cut)).total
+    assert np.abs(found.total - want).max() < 1e-3 * np.abs(want).max()
+    assert "by the T-matrix" in cut_svg(request, angles, found)
+    assert not made_matrix(sc.Ellipsoid(60.0, 40.0, 30.0), request)
+
+
+@pytest.mark.slow
+def test_a_refined_cut_keeps_the_parts_of_rays():
+    body, request = sc.Ellipsoid(0.6, 0.5, 0.4), REQUEST.changed(wavenumber=2.0)
+    assert made_matrix(body, request)
+    refined = found_of(body, request)[2].far
+    assert set(refined.method) == {"t-matrix"} and refined.parts

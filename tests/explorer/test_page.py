@@ -10,7 +10,8 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.explorer.frames import preview_of
+from creeping.explorer.frames import matrix_cut, preview_of
+from creeping.explorer.panel import cut_svg
 from creeping.explorer.request import ViewRequest
 from tests.patience import HANGS, until
 
@@ -238,6 +239,19 @@ def test_a_refined_view_is_not_drawn_over_a_newer_frame(page, monkeypatch):
     page.ask(theta=60.0)
     until(lambda: 70.0 in drawn)
     assert began[0] == 60.0 and 60.0 not in drawn
+
+
+@pytest.mark.slow
+def test_the_cut_follows_the_hand_by_the_t_matrix_once_it_is_made(page, monkeypatch):
+    monkeypatch.setattr("creeping.explorer.frames.PATIENCE", 20.0)
+    page.ask(wavenumber=3.0)
+    until(lambda: "by the T-matrix" in page.cut.content, lambda: page.status.content)
+    monkeypatch.setattr("creeping.explorer.page.refined_view", lambda *_: None)
+    before = page.cut.content
+    page.ask(theta=77.0)
+    angles = np.arange(-180.0, 181.0, 2.0)
+    want = cut_svg(page.request, angles, matrix_cut(page.flow.body, page.request, angles))
+    until(lambda: page.cut.content == want != before, lambda: page.status.content)
 
 
 def test_iso_phase_curves_can_be_turned_off_and_a_refusal_resets_the_slider(page):
