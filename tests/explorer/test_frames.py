@@ -177,7 +177,7 @@ def test_the_cut_is_that_of_the_t_matrix_where_one_was_made():
 
 @pytest.mark.slow
 def test_a_refined_cut_keeps_the_parts_of_rays():
-    body, request = sc.Ellipsoid(0.6, 0.5, 0.4), REQUEST.changed(wavenumber=2.0)
+    body, request = sc.Ellipsoid(1.2, 0.8, 0.6), REQUEST.changed(wavenumber=12.0)
     assert made_matrix(body, request)
     refined = found_of(body, request)[2].far
     assert set(refined.method) == {"t-matrix"} and refined.parts
