@@ -3,7 +3,7 @@
 Lengths of the body are metres. Angles are those of the radar or the observer as seen from the body.
 """
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -19,10 +19,8 @@ def rcs(
     echo: options.EchoOptions = options.AS_USUAL,
     file: options.FileOptions = options.AS_IT_IS,
 ) -> int:
-    """Radar cross section of a perfect conductor in dBsm: over angle, over frequency, or both."""
-    from creeping.commands.echo_report import run_echo
-
-    return run_echo("rcs", body, echo, file, sound_speed=None, polarisation=polarisation, boundary="pec")
+    """Radar cross section of a perfect conductor in dBsm: over angle, frequency or both, or in the mean."""
+    return _run("rcs", body, echo, file, sound_speed=None, polarisation=polarisation, boundary="pec")
 
 
 def ts(
@@ -33,10 +31,19 @@ def ts(
     echo: options.EchoOptions = options.AS_USUAL,
     file: options.FileOptions = options.AS_IT_IS,
 ) -> int:
-    """Target strength of a body in dB re 1 m: over angle, over frequency, or both."""
-    from creeping.commands.echo_report import run_echo
+    """Target strength of a body in dB re 1 m: over angle, frequency or both, or in the mean."""
     from creeping.errors import InvalidInputError
 
     if boundary == "pec":
         raise InvalidInputError("--boundary pec is of radar: creeping rcs")
-    return run_echo("ts", body, echo, file, sound_speed=sound_speed, polarisation=None, boundary=boundary)
+    return _run("ts", body, echo, file, sound_speed=sound_speed, polarisation=None, boundary=boundary)
+
+
+def _run(quantity: str, body: str, echo: options.EchoOptions, file: options.FileOptions, **wave: Any) -> int:
+    if echo.average:
+        from creeping.commands.averages import run_averages
+
+        return run_averages(quantity, body, echo, file, **wave)
+    from creeping.commands.echo_report import run_echo
+
+    return run_echo(quantity, body, echo, file, **wave)

@@ -100,6 +100,14 @@ class EchoOptions:
         str | None,
         Parameter(group=ANGLES, help="AZIMUTH,ELEVATION of the radar, degrees; of a cut the angle that stays. 0,0."),
     ] = None
+    average: Annotated[
+        bool,
+        Parameter(
+            negative="",
+            group=ANGLES,
+            help="The mean over all orientations of the body, by one T-matrix a frequency, in place of angles.",
+        ),
+    ] = False
     compare: Annotated[
         Path | None,
         Parameter(group=OUTPUT, help="Measured cut to compare with, a table with a column of angles or frequencies."),

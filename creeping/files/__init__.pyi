@@ -9,6 +9,8 @@ from .polylines import polydata as polydata
 from .spectra import write_sofa as write_sofa
 from .spectra import write_stk as write_stk
 from .spectra import write_touchstone as write_touchstone
+from .tables import averaged_levels as averaged_levels
+from .tables import write_averages as write_averages
 from .tables import write_couplings as write_couplings
 from .tables import write_csv as write_csv
 from .tables import write_echo as write_echo

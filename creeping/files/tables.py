@@ -13,6 +13,7 @@ import numpy as np
 from creeping._typing import Any, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.results.comparison import cross_section_decibels, decibels
+from creeping.field.results.echo import LEVELS
 from creeping.field.results.point_result import FieldStatus
 from creeping.files.polylines import polydata
 from creeping.geometry.checks import UNKNOWN, unit_of
@@ -22,6 +23,8 @@ from creeping.shadow.line import ShadowLine
 from creeping.storage.atomic import written_aside
 
 if TYPE_CHECKING:
+    import xarray
+
     from creeping.field.cut_result import FieldCut
     from creeping.field.ports.coupling_result import Coupling
     from creeping.field.results.echo import Echo
@@ -428,3 +431,42 @@ def _wave_column(couplings: "Sequence[Coupling]", hertz: FloatArray | None, rows
     if hertz is not None:
         return "frequency_hz", "", np.repeat(hertz, rows)
     return "wavenumber", f"1/{couplings[0].length_unit}", np.repeat([one.wavenumber for one in couplings], rows)
+
+
+def write_averages(
+    path: str | os.PathLike[str], quantity: str, hertz: FloatArray, averages: "xarray.Dataset", *, mark: str = ""
+) -> None:
+    """Write means over orientation as CSV, a row for each frequency.
+
+    Parameters
+    ----------
+    path : str or path
+    quantity : {"rcs", "ts"}
+    hertz : (k,), Hz
+    averages : xarray.Dataset
+        Of `creeping.orientation_averages`, in metres.
+    mark : str
+        What the first line says of rows that are missing.
+
+    Raises
+    ------
+    CreepingError
+        If the file cannot be written.
+    """
+    level, unit = LEVELS[quantity]
+    columns: list[Column] = [
+        ("frequency_hz", "", hertz),
+        ("wavenumber_1_m", "k", averages.wavenumber.values),
+        ("level_db", f"{level}, {unit}, of the mean over orientation", averaged_levels(quantity, averages)),
+        ("error_db", "of the level", averages.target_strength_error.values),
+    ]
+    for name in ("backscattering", "scattering", "extinction"):
+        columns.append((f"{name}_m2", str(averages[name].attrs["description"]), averages[name].values))
+    _write_table(path, columns, mark)
+
+
+def averaged_levels(quantity: str, averages: "xarray.Dataset") -> FloatArray:
+    """Levels (k,), dBsm or dB re 1 m, of means over orientation."""
+    if quantity == "ts":
+        return np.asarray(averages.target_strength.values)
+    return np.asarray(10 * np.log10(averages.backscattering.values))

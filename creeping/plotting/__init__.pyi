@@ -15,3 +15,4 @@ from .pictures import picture as picture
 from .plane_pictures import field_cut_picture as field_cut_picture
 from .scene import GLProbe as GLProbe
 from .scene import gl_available as gl_available
+from .t_matrix_pictures import averages_picture as averages_picture

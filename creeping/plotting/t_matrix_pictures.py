@@ -1,12 +1,18 @@
-"""Pictures of a T-matrix: its backscatter in all directions, and the size of its entries by degrees of the waves."""
+"""Pictures of a T-matrix: its backscatter in all directions, and the size of its entries by degrees of the waves.
 
+Also here: means over orientation against frequency.
+"""
+
+import os
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError
+from creeping.field.frequency import suited
 from creeping.field.results.comparison import decibels, shown_range
+from creeping.field.results.echo import LEVELS
 from creeping.field.tmatrix.patterns import degrees_of
 from creeping.geometry.directions import directions_from_azimuth_elevation
 from creeping.plotting import pages
@@ -62,6 +68,36 @@ def plot_t_matrix(
     else:
         _draw_waves(ax, T, span)
     return pages.finished(ax, fresh, pages.wave_title(T, T.unit), legend=False)
+
+
+def averages_picture(
+    path: str | os.PathLike[str],
+    quantity: str,
+    hertz: FloatArray,
+    levels: FloatArray,
+    error: FloatArray,
+    *,
+    title: str = "",
+    dpi: int = 200,
+) -> None:
+    """Write a PNG of levels (k,), dB, averaged over orientation, with their errors (k,), dB, against frequencies, Hz.
+
+    Raises
+    ------
+    CreepingError
+        If nothing can be drawn, or the file cannot be written.
+    """
+    name, unit = LEVELS[quantity]
+    scale, hertz_name = suited(float(hertz.max()))
+    low, high = shown_range([levels - error, levels + error], SPANS["backscatter"], step=1.0)
+    with pages.written_figure(path, pages.PAGE, dpi) as figure:
+        ax = figure.add_subplot()
+        look = {"color": pages.COLOURS[0], "alpha": 0.18, "linewidth": 0}
+        ax.fill_between(hertz / scale, levels - error, levels + error, label="stated error", **look)
+        ax.plot(hertz / scale, levels, label="mean over orientation", **pages.curve_style(0))
+        ax.set(xlim=(hertz[0] / scale, hertz[-1] / scale), ylim=(low, high))
+        pages.dressed(ax, f"frequency ({hertz_name})", f"{name} ({unit})")
+        pages.finished(ax, True, title)
 
 
 def _draw_backscatter(ax: Any, T: "TMatrix", component: str | None, span: float) -> None:

@@ -16,12 +16,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creeping._progress import reporting
-from creeping._typing import Any, ArrayLike, FloatArray
+from creeping._typing import Any, ArrayLike
 from creeping._version import __version__
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked
 from creeping.field.boundary import BoundaryLike, boundary_name
 from creeping.field.tmatrix.computing import SECONDS, refuse, t_matrix
+from creeping.field.tmatrix.patterns import Averages
 from creeping.field.tmatrix.result import TMatrix
 from creeping.geometry.checks import unit_of
 from creeping.geometry.surface import Surface
@@ -145,15 +146,15 @@ def orientation_averages(
     >>> ds.target_strength.round(1).values.tolist()
     [-32.2, -15.6]
     """
-    library = require("xarray")
-    rows, k = [], []
     asked: dict[str, Any] = {"wavenumbers": wavenumbers, "boundary": boundary, "seconds": seconds}
-    for T in t_matrices(body, store=store, client=client, progress=progress, **asked):
-        k.append(T.wavenumber)
-        found = T.orientation_average()
-        rows.append((*found[:3], found.target_strength, found.target_strength_error))
-    unit = unit_of(body)
-    means = "averaged over all orientations" + " and both polarisations" * T.vector
+    matrices = t_matrices(body, store=store, client=client, progress=progress, **asked)
+    return averages_of(body, boundary, [(T.wavenumber, T.orientation_average()) for T in matrices])
+
+
+def averages_of(body: Surface, boundary: BoundaryLike, rows: list[tuple[float, Averages]]) -> xarray.Dataset:
+    """Dataset of `orientation_averages` of wavenumbers, 1/L, and averages."""
+    library, unit = require("xarray"), unit_of(body)
+    means = "averaged over all orientations" + " and both polarisations" * (boundary_name(boundary) == "pec")
     words = {
         "backscattering": ("L^2", f"4 pi |f(d, -d)|^2, {means}"),
         "scattering": ("L^2", f"scattering cross section, {means}"),
@@ -161,12 +162,20 @@ def orientation_averages(
         "target_strength": ("dB re 1 L", "10 log10(backscattering/4 pi)"),
         "target_strength_error": ("dB", "error of the target strength"),
     }
-    lanes: FloatArray = np.array(rows).T
     variables = {
-        name: ("wavenumber", lane, {"units": in_unit(units, unit), "description": text})
-        for (name, (units, text)), lane in zip(words.items(), lanes, strict=True)
+        name: (
+            "wavenumber",
+            np.array([getattr(found, name) for _, found in rows]),
+            {"units": in_unit(units, unit), "description": text},
+        )
+        for name, (units, text) in words.items()
     }
-    coordinates = {"wavenumber": ("wavenumber", np.array(k), {"units": in_unit("1/L", unit), "description": "k"})}
-    attributes = {"body": T.body, "boundary": boundary_name(boundary), "creeping_version": __version__}
+    k = np.array([k for k, _ in rows])
+    coordinates = {"wavenumber": ("wavenumber", k, {"units": in_unit("1/L", unit), "description": "k"})}
+    attributes = {
+        "body": " ".join(repr(body).split()),
+        "boundary": boundary_name(boundary),
+        "creeping_version": __version__,
+    }
     dataset: xarray.Dataset = library.Dataset(variables, coordinates, attributes)
     return dataset
