@@ -101,14 +101,15 @@ class Traced(NamedTuple):
 
 def traced(body: Surface, waves: FloatArray, tier: int) -> Traced:
     """Nodes of the lines of waves (n, 4) on a mesh."""
-    from creeping.shadow.kernels.trace import CERTAIN, CURVES, ERROR, FOUND, KNOWN, LEAST_NODES, trace
+    from creeping.shadow.kernels.trace import CERTAIN, CURVES, ERROR, FOUND, KNOWN, LEAST_NODES, lines_on_mesh
 
     mesh, n = prepared(body).packed(tier), len(waves)
     most = mesh[-1] + (LEAST_NODES + 8) * CURVES
     x, T, kappa = np.empty((n, most, 3)), np.empty((n, most, 3)), np.empty((n, most))
     starts, spacing, known = np.empty((n, CURVES + 1), np.int64), np.empty((n, CURVES)), np.zeros((n, KNOWN))
     with evaluators(body) as parts:
-        trace(*parts[:2], float(np.max(np.ptp(box_of(body), axis=0))), mesh, waves, x, T, kappa, starts, spacing, known)
+        extent = float(np.max(np.ptp(box_of(body), axis=0)))
+        lines_on_mesh(*parts[:2], extent, mesh, waves, x, T, kappa, starts, spacing, known)
     nodes: list[LineNodes | None] = [None] * n
     for row in np.flatnonzero(known[:, FOUND]):
         curves = int(known[row, FOUND])

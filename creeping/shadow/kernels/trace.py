@@ -47,7 +47,7 @@ _FOUR = np.array([13, -1, 0, 0, 0, 0]) / 24
 
 
 @njit(**options)
-def trace(level, level_par, extent, mesh, waves, x, tangents, curvature, starts, spacing, known):
+def lines_on_mesh(level, level_par, extent, mesh, waves, x, tangents, curvature, starts, spacing, known):
     """Nodes of the lines of waves (n, 4), (d, w), the longest curve of each first.
 
     Parameters
