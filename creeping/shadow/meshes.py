@@ -61,7 +61,7 @@ class LineMeshes:
             return self._meshes[tier]
 
     def packed(self, tier: int) -> tuple[Any, ...]:
-        """Mesh of a tier as `shadow.kernels.trace` takes it."""
+        """Mesh of a tier as `shadow.kernels.trace.lines_on_mesh` takes it."""
         with self._lock:
             if tier not in self._packed:
                 nodes = FINEST_NODES if tier == len(TIERS) else TIERS[tier][1]
