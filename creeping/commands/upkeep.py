@@ -215,8 +215,8 @@ def _end_with_parent() -> None:
 def steps(first: str) -> list[Callable[[], object]]:
     """Parts of the job, those that the parent comes to last first.
 
-    But for rays, and the second half of their line: from its first half the parent comes to them whatever it does, and
-    not so soon that they would be compiled twice.
+    But for rays: from their line the parent comes to them whatever it does, and not so soon that they would be compiled
+    twice.
     """
     import numpy as np
 
@@ -224,7 +224,6 @@ def steps(first: str) -> list[Callable[[], object]]:
     import scatterers as sc
     from creeping.geodesics.states import pack
     from creeping.shadow.many import shadow_lines
-    from creeping.shadow.nodes import Breaks, LineNodes, shared
 
     body = sc.Sphere()
     directions = cr.fibonacci_directions(2)
@@ -233,13 +232,6 @@ def steps(first: str) -> list[Callable[[], object]]:
     def rays() -> None:
         start = pack(np.array([[1.0, 0.0, 0.0]]), np.array([[0.0, 0.0, 1.0]]), lanes=12)
         cr.DirectFlow(body).transport(start, np.linspace(0.0, 1.0, 9))
-
-    def arcs() -> None:
-        turn = np.linspace(0.0, 2 * np.pi, 65)[:-1]
-        x, T = np.array([np.cos(turn), np.sin(turn), 0 * turn]), np.array([-np.sin(turn), np.cos(turn), 0 * turn])
-        circle = LineNodes(x, T, np.ones(64), np.array([0, 64]), np.array([2 * np.pi / 64]), 0.0)
-        none = Breaks(np.empty(1), np.empty(1, np.int64), 0, (32, 0, 48, 16), True)
-        shared(body, np.array([0.0, 0.0, 1.0]), circle, none, 16)
 
     def lines() -> None:
         shadow_lines(body, np.asarray(directions), 8)
@@ -256,5 +248,5 @@ def steps(first: str) -> list[Callable[[], object]]:
         cr.sweep_directions(cr.build_phase_map(body, tolerance=1e-3, cache=False), directions, **waves)
 
     if first.startswith("creeping.shadow"):
-        return [rays, arcs, maps, sweeps, one_incidence]
+        return [rays, maps, sweeps, one_incidence]
     return [lines, sweeps, one_incidence, maps]

@@ -17,10 +17,10 @@ import numpy as np
 
 from creeping._typing import FloatArray, IntArray
 from creeping.errors import IntegrationError
-from creeping.geodesics.equations import natural_horizon
-from creeping.geodesics.hermite import Sliding, sliding
+from creeping.geodesics.equations import natural_horizon, vector_field
+from creeping.geodesics.hermite import NEAREST, Sliding, sliding
 from creeping.geodesics.integrator import MAX_STEPS, trace_states
-from creeping.geometry.evaluators import evaluators
+from creeping.geometry.evaluators import evaluators, speed_of
 from creeping.geometry.surface import Surface
 from creeping.kernels.threads import CHUNK, in_slices, in_threads
 
@@ -32,6 +32,8 @@ FINE_GAUSS, FINE_SEARCH = NODES - 2, 16
 """Gauss points of an interval of a traced ray, and parts of it in which the first zero is looked for."""
 DIP, REFINED = 0.2, 3
 """Least over greatest curvature of an interval below which each of its parts is integrated, at so many Gauss points."""
+TOGETHER = 4096
+"""Most rays at a time."""
 WORKSPACE = 2**24
 """Numbers that the states at fine times may take."""
 
@@ -212,9 +214,29 @@ def _along(body: Surface, states: FloatArray, fine: Sliding, place: IntArray, ou
     """
     from creeping.geodesics.kernels.attenuation import extend_along as kernel
 
-    with evaluators(body) as parts:
+    if states.shape[2] > 6:
+        out[..., : states.shape[2]] = states[:, place]
 
-        def run(part: slice) -> None:
-            kernel(*parts, states[part], *fine, (*fine_rules(), DIP), place, out[part])
+    def run(part: slice) -> None:
+        kernel(_bent(body, states[part, :, :6], fine), fine.times, (*fine_rules(), DIP), place, out[part])
 
-        in_threads(run, len(states), seconds=1e-7 * states.shape[1])
+    in_threads(run, len(states), seconds=1e-6 * states.shape[1], most=TOGETHER)
+
+
+def _bent(body: Surface, states: FloatArray, fine: Sliding) -> FloatArray:
+    """c^(3/2) kappa_n at the ends of each fine interval and at the Gauss points between: (intervals, NODES, n)."""
+    x, p = states[:, fine.knots, :3], states[:, fine.knots, 3:]
+    along, turning = vector_field(body, x, p)
+    speed = speed_of(body)
+    if speed is not None:
+        turning = speed.value(x)[..., None] * turning + np.sum(speed.gradient(x) * along, axis=-1, keepdims=True) * p
+    # x, x', x'' at the knots around each interval, by rows
+    jets = np.stack([x, along, turning], axis=2)
+    bent = np.empty((len(fine.first), NODES, len(states)))
+    ends = curvature_values(body, states.reshape(-1, 6)).reshape(states.shape[:2]).T
+    bent[:, 0], bent[:, -1] = ends[:-1], ends[1:]
+    for m, first in enumerate(fine.first):
+        around = jets[:, first : first + NEAREST].reshape(len(states), 3 * NEAREST, 3)
+        between = np.concatenate([fine.position[m] @ around, fine.velocity[m] @ around], axis=-1)
+        bent[m, 1:-1] = curvature_values(body, between.reshape(-1, 6)).reshape(len(states), -1).T
+    return bent

@@ -135,6 +135,9 @@ def in_threads(
         Rows of the longest slice.
     """
     threads = min(thread_count(), max(1, count // least))
+    if getattr(_team, "stop", None) is not None:
+        # threads that wait for threads of their own pool would wait for ever
+        threads = 1
     longest = count + multiple
     if threads > 1:
         # more slices than threads: rays of one region may cost more than those of another

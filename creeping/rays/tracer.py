@@ -25,7 +25,7 @@ from creeping.geometry.surface import Surface, size
 from creeping.rays.ends import non_smooth_from
 from creeping.rays.quantities import GAUSS, GUARD, LANES, START_LANES, RayPoints
 from creeping.rays.reach import SingleRays
-from creeping.shadow.many import moved_onto_lines
+from creeping.shadow.moving import moved_onto_lines
 
 TURN = 0.12
 """Largest angle by which a ray turns in one step: polynomials of degree 9 then err by about 1e-9."""
@@ -66,8 +66,8 @@ class RayTracer:
         """Points of the shadow lines next to the given ones, and T there: (n, 3), (n, 3)."""
         reach = 0.1 * size(self.body)
         if not is_piecewise(self.body):
-            points, tangents, _ = moved_onto_lines(self.body, directions, points, reach=reach, steps=steps)
-            return points, tangents
+            moved = moved_onto_lines(self.body, directions, points, reach=reach, steps=steps)
+            return moved.points, moved.tangents
         points, tangents = points.copy(), np.zeros_like(points)
         # each on the piece that it is next to
         on, bodies = piece_ahead(self.body, points, directions), pieces_of(self.body)

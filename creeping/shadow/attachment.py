@@ -11,6 +11,7 @@ the ray enters the body where F is negative at a sample, or at a minimum between
 Sources: [K84]; Derivations, R10.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
@@ -18,7 +19,6 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
-from creeping.geometry.evaluators import evaluators
 from creeping.geometry.incident import REMEDY, headings, openings, optical_paths, spherical
 from creeping.geometry.parts import is_faceted, why_no_rays
 from creeping.geometry.piecewise import is_convex, is_piecewise
@@ -26,6 +26,12 @@ from creeping.geometry.surface import Surface, size
 from creeping.kernels.threads import in_slices
 from creeping.shadow.status import NO_RAY
 
+SAMPLES = 192
+"""Samples of F from a point to where its backward ray leaves the box."""
+MINIMUM = 6
+"""Newton steps to a minimum of F between samples."""
+SLICE = 256
+"""Rays at a time."""
 ABOVE = 1e-5
 """Height of points just above nodes of tiles, in body sizes: the polynomials of tiles may pass under the body."""
 
@@ -69,14 +75,21 @@ class LaunchPoints:
     state: FloatArray
 
     @classmethod
-    def unpacked(cls, waves: FloatArray, launched: FloatArray, places: Any) -> "LaunchPoints":
-        """From what the kernels fill, (n, rays, LAUNCHED) and (n, rays)."""
-        from creeping.shadow.kernels.trace import ARC, ARCLENGTH, CLOSED, SPACING, STATE
+    def blank(cls, waves: FloatArray, n_rays: int) -> "LaunchPoints":
+        """So many places of each incidence, none with a ray."""
+        shape = len(waves), n_rays
+        nothing = [np.full(shape, np.nan) for _ in range(5)]
+        return cls(waves, np.full((*shape, 3), np.nan), nothing[0], np.full(shape, NO_RAY, np.int16), *nothing[1:])
 
-        arclength, arc = launched[..., ARCLENGTH], launched[..., ARC]
-        spacing, closed = launched[..., SPACING], launched[..., CLOSED]
-        state = launched[..., STATE]
-        return cls(waves, launched[..., :3], arclength, places, arc, spacing, closed, state)
+    def put(self, rows: IntArray, those: "LaunchPoints") -> None:
+        """Take the rays of some incidences, in place."""
+        for one in fields(self)[1:]:
+            getattr(self, one.name)[rows] = getattr(those, one.name)
+
+    @classmethod
+    def together(cls, parts: Sequence["LaunchPoints"]) -> "LaunchPoints":
+        """Those of several sets of incidences, one after the other."""
+        return cls(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(cls)))
 
     @property
     def directions(self) -> FloatArray:
@@ -176,24 +189,40 @@ def occluded(body: Surface, points: FloatArray, direction: FloatArray, reach: Fl
 
     It leaves a point along the normal's side, or touches there from a convex side.
     """
-    from creeping.shadow.kernels.arcs import blocked_rays
-
     hidden = np.zeros(len(points), dtype=bool)
-    if not len(points):
-        return hidden
-    # copies: of arrays that cannot be written kernels would be compiled once more
-    directions = np.array(np.broadcast_to(direction, points.shape), dtype=float, order="C")
-    limit = np.array(np.broadcast_to(reach, len(points)), dtype=float)
-    box = np.ascontiguousarray(body.bounds, dtype=float)
-    columns = np.ascontiguousarray(points.T, dtype=float)
-    with evaluators(body) as parts:
+    d, limit = np.broadcast_to(direction, points.shape), np.broadcast_to(reach, len(points))
+    low, high = np.asarray(body.bounds, dtype=float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        out = np.where(d == 0, np.inf, (points - np.where(d > 0, low, high)) / d).min(axis=1, initial=np.inf)
+    # a point on the face of the box, or just beyond it by rounding, has nothing behind
+    step = np.minimum(np.maximum(out, 0.5e-3 * np.linalg.norm(high - low)), limit) / SAMPLES
 
-        def run(part: slice) -> None:
-            some = np.ascontiguousarray(columns[:, part])
-            blocked_rays(*parts[:2], box, directions[part], some, limit[part], hidden[part])
+    def run(part: slice) -> None:
+        x, back, h = points[part], d[part], step[part, None]
+        t = h * np.arange(1, SAMPLES + 2)
+        F = np.asarray(body.level((x[:, None] - t[..., None] * back[:, None]).reshape(-1, 3))).reshape(t.shape)
+        hidden[part] = np.any(F < 0, axis=1)
+        least = (F[:, 1:-1] < F[:, :-2]) & (F[:, 1:-1] <= F[:, 2:]) & ~hidden[part, None]
+        row, sample = np.nonzero(least)
+        if len(row):
+            under = _dips(body, x[row], back[row], t[row, sample + 1], h[row, 0])
+            hidden[part.start + row[under]] = True
 
-        in_slices(run, len(points), seconds=1e-5)
+    in_slices(run, len(points), seconds=1e-5, multiple=SLICE)
     return hidden
+
+
+def _dips(body: Surface, points: FloatArray, d: FloatArray, t: FloatArray, h: FloatArray) -> BoolArray:
+    """Whether F < 0 at its minimum on x - t d within h of t: (m, 3), (m, 3), (m,), (m,) -> (m,)."""
+    start = t
+    for _ in range(MINIMUM):
+        x = points - t[:, None] * d
+        slope = -np.sum(body.gradient(x) * d, axis=1)
+        bend = np.einsum("mi,mij,mj->m", d, body.hessian(x), d)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            move = np.where(bend > 0, -slope / bend, -np.copysign(0.25 * h, slope))
+        t = np.clip(t + move, start - h, start + h)
+    return np.asarray(body.level(points - t[:, None] * d) < 0)
 
 
 def is_lit(body: Any, points: FloatArray, normals: FloatArray, direction: FloatArray) -> BoolArray:

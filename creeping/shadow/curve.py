@@ -17,12 +17,10 @@ from creeping.errors import InvalidInputError
 from creeping.geometry.checks import unit_of
 from creeping.geometry.incident import REMEDY, headings, spherical
 from creeping.geometry.surface import Surface
-from creeping.shadow.nodes import LineNodes, polished
+from creeping.shadow.curves import LineNodes, interpolated
+from creeping.shadow.nodes import polished
 from creeping.shadow.panels import PanelCurve, fit_panels
 from creeping.shadow.status import CONCAVE, STATUSES
-
-HALF = 6
-"""Nodes on either side that a polynomial along a curve goes through."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -111,8 +109,7 @@ class ShadowCurve(DrawnOnBody):
         else:
             x, tangents, curvature = polished(self.body, self.wave, self.nodes)
         spacing = np.array([self.length / len(x)])
-        columns = np.ascontiguousarray(x.T), np.ascontiguousarray(tangents.T)
-        return LineNodes(*columns, curvature, np.array([0, len(x)]), spacing, self.error)
+        return LineNodes(x, tangents, curvature, np.array([0, len(x)]), spacing, self.error)
 
     def state_at(self, arclength: FloatArray) -> IntArray:
         """Codes of the status at arclengths modulo the length, of an open curve no further than its ends: (m,)."""
@@ -135,7 +132,7 @@ class ShadowCurve(DrawnOnBody):
             )
         if "panels" in vars(self):
             return self.panels.at(s.ravel()).reshape(*s.shape, 3)
-        points = interpolated(self.nodes, s.ravel() / self.length * len(self.nodes))
+        points = interpolated(self.nodes, 0, len(self.nodes), s.ravel() / self.length * len(self.nodes))
         return polished(self.body, self.wave, points)[0].reshape(*s.shape, 3)
 
     def __repr__(self) -> str:
@@ -146,19 +143,6 @@ class ShadowCurve(DrawnOnBody):
             f"  |n.d| at most {np.max(np.abs(self.grazing)):.1e}; "
             f"kappa_n(d) from {np.min(self.curvature):.3g} to {np.max(self.curvature):.3g} 1/{unit}"
         )
-
-
-def interpolated(nodes: FloatArray, places: FloatArray) -> FloatArray:
-    """Points of a closed curve at numbers of nodes with fractions, by polynomials: (k, 3), (m,) -> (m, 3)."""
-    first = np.floor(places).astype(np.int64)
-    offsets = np.arange(1 - HALF, HALF + 1)
-    u = (places - first)[:, None] - offsets
-    before, after = np.ones_like(u), np.ones_like(u)
-    before[:, 1:] = np.cumprod(u[:, :-1], axis=1)
-    after[:, :-1] = np.cumprod(u[:, :0:-1], axis=1)[:, ::-1]
-    scale = np.array([np.prod([j - i for i in offsets if i != j], dtype=float) for j in offsets])
-    weights = before * after / scale
-    return np.asarray(np.einsum("mj,mjc->mc", weights, nodes[(first[:, None] + offsets) % len(nodes)]))
 
 
 def spelled(fractions: dict[str, float]) -> str:

@@ -11,7 +11,8 @@ from creeping._typing import FloatArray
 from creeping.geometry.incident import headings
 from creeping.geometry.surface import Surface
 from creeping.shadow.critical_points import critical_points
-from creeping.shadow.nodes import LineNodes, prepared
+from creeping.shadow.curves import LineNodes
+from creeping.shadow.nodes import prepared
 from creeping.shadow.panels import PanelCurve, newton_step
 from creeping.shadow.refinement import shadow_curves
 
@@ -45,8 +46,8 @@ def followed(body: Surface, wave: FloatArray) -> tuple[LineNodes, tuple[PanelCur
     p = headings(wave, x)
     bent = np.einsum("nij,ni,nj->n", body.hessian(x), p, p)
     nodes = LineNodes(
-        points=np.ascontiguousarray(x.T),
-        tangents=np.ascontiguousarray(tangents.T),
+        points=x,
+        tangents=tangents,
         curvature=bent / np.linalg.norm(body.gradient(x), axis=1),
         starts=np.cumsum([0, *map(len, points)]).astype(np.int64),
         spacing=np.array(spacing),

@@ -22,14 +22,16 @@ from creeping.errors import InvalidInputError
 from creeping.geometry.arguments import checked_body, whole_number
 from creeping.geometry.checks import unit_of
 from creeping.geometry.evaluators import speed_of
-from creeping.geometry.incident import Incident, PointSource, incident_of, plane_direction
+from creeping.geometry.incident import Incident, PointSource, incident_of, plane_direction, rows_of
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface, normal, size
+from creeping.shadow.arcs import Arcs, finished
 from creeping.shadow.attachment import Arc, LaunchPoints
-from creeping.shadow.curve import ShadowCurve, counted, interpolated, spelled
+from creeping.shadow.curve import ShadowCurve, counted, spelled
+from creeping.shadow.curves import Curves, LineNodes, interpolated
 from creeping.shadow.edges import EdgePart
 from creeping.shadow.following import followed
-from creeping.shadow.nodes import Finished, LineNodes, clearance, finished, line_nodes, polished
+from creeping.shadow.nodes import clearance, line_nodes, polished
 from creeping.shadow.panels import PanelCurve
 from creeping.shadow.piecewise import launched_from, piecewise_curves
 from creeping.shadow.status import NEAR_SINGULAR, STATUSES
@@ -92,6 +94,10 @@ class ShadowLine(DrawnOnBody):
         return self.source.row(self.body)
 
     @property
+    def _together(self) -> Curves:
+        return Curves.of(rows_of(self.wave)[None], [self.nodes])
+
+    @property
     def length(self) -> float:
         """Length of all curves, L, without the parts on edges and next to tips."""
         return self.nodes.length
@@ -129,8 +135,7 @@ class ShadowLine(DrawnOnBody):
         within_budget(400.0 * n_rays, f"{n_rays} rays", "ask for fewer")
         if is_piecewise(self.body):
             return launched_from(self.curves, self.arcs(launch_from), self.direction, n_rays)
-        found = finished(self.body, self.wave, self.nodes, n_rays, every=launch_from == "all")
-        return LaunchPoints.unpacked(self.wave[None], found.launched[None], found.places[None])
+        return finished(self.body, self._together, n_rays, every=launch_from == "all").launch
 
     def __repr__(self) -> str:
         worst = max((float(np.max(np.abs(curve.grazing))) for curve in self.curves), default=0.0)
@@ -205,16 +210,17 @@ def shadow_line(
     if isinstance(incident, PointSource):
         _checked_height(body, incident)
     d = incident.row(body)
-    nodes, code, distance = line_nodes(body, d)
+    line, code, distance = line_nodes(body, d)
     panels: tuple[PanelCurve, ...] = ()
-    if nodes is None or code == NEAR_SINGULAR:
+    if line is None or code == NEAR_SINGULAR:
         exact, panels, distance = followed(body, d)
-        if nodes is not None and len(nodes.spacing) == len(panels):
+        if line is not None and len(line[0].spacing) == len(panels):
             # the meshes had the right number of curves: the line is theirs, as in a sweep
-            exact, panels = nodes, ()
-        nodes = exact
-    found = finished(body, d, nodes, 0)
-    curves = [_curve(body, d, nodes, found, k, n_points) for k in range(len(nodes.spacing))]
+            panels = ()
+        else:
+            line = exact, finished(body, Curves.of(rows_of(d)[None], [exact]), 0).arcs
+    nodes, arcs = line
+    curves = [_curve(body, d, nodes, arcs, k, n_points) for k in range(len(nodes.spacing))]
     for curve, exact_curve in zip(curves, panels, strict=False):
         # the nodes of a line that turns this fast are too far apart to go through
         vars(curve)["panels"] = exact_curve
@@ -253,8 +259,8 @@ def _piecewise_line(body: Surface, source: Incident, n_points: int) -> ShadowLin
     curves, on_edges, at_tips, edge_on = piecewise_curves(body, direction, n_points)
     parts = [curve.line_nodes() for curve in curves]
     nodes = LineNodes(
-        points=np.concatenate([np.zeros((3, 0)), *(part.points for part in parts)], axis=1),
-        tangents=np.concatenate([np.zeros((3, 0)), *(part.tangents for part in parts)], axis=1),
+        points=np.concatenate([np.zeros((0, 3)), *(part.points for part in parts)]),
+        tangents=np.concatenate([np.zeros((0, 3)), *(part.tangents for part in parts)]),
         curvature=np.concatenate([np.zeros(0), *(part.curvature for part in parts)]),
         starts=np.cumsum([0, *(len(part.curvature) for part in parts)]).astype(np.int64),
         spacing=np.concatenate([np.zeros(0), *(part.spacing for part in parts)]),
@@ -263,17 +269,15 @@ def _piecewise_line(body: Surface, source: Incident, n_points: int) -> ShadowLin
     return ShadowLine(body, source, curves, float("inf"), nodes, on_edges, at_tips, edge_on)
 
 
-def _curve(
-    body: Surface, wave: FloatArray, nodes: LineNodes, found: Finished, number: int, n_points: int
-) -> ShadowCurve:
+def _curve(body: Surface, wave: FloatArray, nodes: LineNodes, arcs: Arcs, number: int, n_points: int) -> ShadowCurve:
     first, last = nodes.starts[number : number + 2]
-    own = np.ascontiguousarray(nodes.points[:, first:last].T)
+    own = nodes.points[first:last]
     spacing = float(nodes.spacing[number])
     length = spacing * len(own)
     arclength = np.linspace(0.0, length, n_points, endpoint=False, dtype=np.float64)
-    points, tangents, curvature = polished(body, wave, interpolated(own, arclength / spacing))
-    mine = found.curve == number
-    ends, codes = spacing * found.arcs[mine], found.state[mine]
+    points, tangents, curvature = polished(body, wave, interpolated(own, 0, len(own), arclength / spacing))
+    mine = arcs.curve == number
+    ends, codes = spacing * arcs.ends[mine], arcs.state[mine]
     ends -= length * np.floor(ends[:, :1] / length)
     order = np.argsort(ends[:, 0])
     ends, codes = ends[order], codes[order]
@@ -296,6 +300,6 @@ def _curve(
 
 
 def shares_of(line: ShadowLine) -> dict[str, float]:
-    """Shares of a line's length by state, as its kernel adds them."""
-    found = finished(line.body, line.wave, line.nodes, 0)
-    return dict(zip(line.fractions, (float(share) for share in found.shares), strict=True))
+    """Shares of a line's length by state, as a sweep adds them."""
+    shares = finished(line.body, line._together, 0).shares[0]
+    return dict(zip(line.fractions, shares.tolist(), strict=True))

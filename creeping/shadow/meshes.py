@@ -61,7 +61,7 @@ class LineMeshes:
             return self._meshes[tier]
 
     def packed(self, tier: int) -> tuple[Any, ...]:
-        """Mesh of a tier as `shadow.kernels.trace` takes it."""
+        """Mesh of a tier as `shadow.kernels.trace.lines_on_mesh` takes it."""
         with self._lock:
             if tier not in self._packed:
                 nodes = FINEST_NODES if tier == len(TIERS) else TIERS[tier][1]
@@ -102,7 +102,7 @@ def _packed(body: Surface, mesh: Triangulation, nodes: int) -> tuple[Any, ...]:
     turn = np.linalg.norm(ends - np.roll(ends, 1, axis=1), axis=-1)
     return (
         np.ascontiguousarray(mesh.vertices.T),
-        np.ascontiguousarray(n.T).ravel(),
+        np.ascontiguousarray(n.T),
         # of one layout, for which kernels are compiled once
         np.ascontiguousarray(mesh.triangles, dtype=np.int32),
         neighbours_of(mesh.triangles),

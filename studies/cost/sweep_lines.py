@@ -16,11 +16,12 @@ import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, FloatArray
 from creeping.geometry.directions import fibonacci_directions
-from creeping.geometry.evaluators import evaluators
 from creeping.geometry.incident import rows_of
-from creeping.shadow.many import shadow_lines
+from creeping.shadow.arcs import finished
+from creeping.shadow.curves import Curves
+from creeping.shadow.many import TOGETHER, shadow_lines
 from creeping.shadow.meshes import LineMeshes
-from creeping.shadow.nodes import FORBIDDEN, box_of, critical_distances, judged, prepared
+from creeping.shadow.nodes import FORBIDDEN, critical_distances, judged, prepared, traced
 from creeping.shadow.status import FOLLOWED, INCIDENCE_STATUSES, NEAR_SINGULAR, OK, SINGULAR
 from studies import tables
 from studies.cost.flow_cases import seconds_of, threads
@@ -50,19 +51,19 @@ class Lines(NamedTuple):
 
 def on_mesh(body: Any, directions: FloatArray, tier: int) -> Lines:
     """Lines on one mesh; none is sought on another or followed."""
-    from creeping.shadow.kernels.trace import LAUNCHED, SUMMARY, trace_lines
-
-    n, lines = len(directions), prepared(body)
-    summary, certain = np.empty((n, SUMMARY)), np.empty(n, bool)
-    launched, places = np.empty((n, RAYS, LAUNCHED)), np.empty((n, RAYS), np.int16)
-    with evaluators(body) as parts:
-        trace_lines(
-            *parts[:2], box_of(body), lines.packed(tier), rows_of(directions), False, summary, certain, launched, places
-        )
+    waves, numbers = rows_of(directions), np.full((len(directions), 5), np.nan)
+    certain = np.zeros(len(directions), dtype=bool)
+    for start in range(0, len(waves), TOGETHER):
+        nodes, sure = traced(body, waves[start : start + TOGETHER], tier)
+        rows = start + np.flatnonzero([one is not None for one in nodes])
+        curves = Curves.of(waves[rows], [one for one in nodes if one is not None])
+        found = finished(body, curves, RAYS)
+        numbers[rows] = np.column_stack([curves.counts, curves.lengths, found.shares])
+        certain[rows] = sure[rows - start] & found.certain
     v = critical_distances(body, directions)
-    _, status = judged(v, certain, lines.turn(tier), LineMeshes.count - 2)
+    _, status = judged(v, certain, prepared(body).turn(tier), LineMeshes.count - 2)
     status[v < FORBIDDEN] = SINGULAR
-    return Lines(status, summary[:, 0], summary[:, 1], summary[:, 3:6], v)
+    return Lines(status, numbers[:, 0], numbers[:, 1], numbers[:, 2:], v)
 
 
 def swept(body: Any, directions: FloatArray) -> Lines:

@@ -7,7 +7,8 @@ import shared_bodies as sc
 import creeping as cr
 from creeping.geometry.incident import rows_of
 from creeping.geometry.surface import size
-from creeping.shadow.many import moved_onto_lines, shadow_lines
+from creeping.shadow.many import shadow_lines
+from creeping.shadow.moving import moved_onto_lines
 from creeping.shadow.panels import newton_step, onto_line
 
 

@@ -8,11 +8,9 @@ import math
 import numpy as np
 from numba import njit
 
-from creeping.geodesics.hermite import NEAREST
-from creeping.geodesics.kernels.flow_derivative import derivative, two_thirds
+from creeping.geodesics.kernels.flow_derivative import two_thirds
 from creeping.kernels.block import BLOCK, aligned, entry_options, options
 from creeping.kernels.exponential import second_form
-from creeping.kernels.vectors import pointer
 
 SAMPLES = 23
 """Rows of work space of `extend`: twelve Gauss points, both ends, the least of them, eight Chebyshev times."""
@@ -20,7 +18,7 @@ SAMPLES = 23
 
 @njit(**entry_options)
 def curvatures(level, level_par, speed, speed_par, weighted, states, out):
-    """c^(3/2) kappa_n of states (n, 6 or more) into out (n,)."""
+    """c^(3/2) kappa_n of states (n, 6 or more), x and a vector of any length along the ray, into out (n,)."""
     n = states.shape[0]
     x, geometry = aligned(3, BLOCK), aligned(10, BLOCK)
     for start in range(0, n, BLOCK):
@@ -33,7 +31,8 @@ def curvatures(level, level_par, speed, speed_par, weighted, states, out):
             px, py, pz = states[start + i, 3], states[start + i, 4], states[start + i, 5]
             xx, yy, zz, yz = geometry[4, i], geometry[5, i], geometry[6, i], geometry[7, i]
             bent = second_form(px, py, pz, xx, yy, zz, yz, geometry[8, i], geometry[9, i])
-            out[start + i] = bent / math.sqrt(geometry[1, i] ** 2 + geometry[2, i] ** 2 + geometry[3, i] ** 2)
+            steep = math.sqrt(geometry[1, i] ** 2 + geometry[2, i] ** 2 + geometry[3, i] ** 2)
+            out[start + i] = bent / ((px * px + py * py + pz * pz) * steep)
         if weighted:
             speed(x, geometry[0], geometry[1:4], geometry[4:], speed_par)
             for i in range(count):
@@ -149,82 +148,49 @@ def _polynomial(c, nodes, t):
 
 
 @njit(**entry_options)
-def extend_along(
-    level, level_par, speed, speed_par, weighted, states, times, knots, first, position, velocity, rules, place, out
-):
+def extend_along(bent, times, rules, place, out):
     """Carry A and the time of detachment through all fine intervals, into the last two lanes of out (n, m, 12).
 
-    states (n, times, 6 or 10) are those at the fine times, ten lanes are copied to out; ``place`` (m,) are the numbers
-    of the outputs among them. out[:, 0] holds the two lanes' values at the start. Twin of `attenuation.extend_along`;
+    bent (intervals, NODES, n) are c^(3/2) kappa_n at both ends of each interval and at the Gauss points between them;
+    ``place`` (m,) are the numbers of the outputs among the fine times. out[:, 0] holds the values at the start.
     ``rules`` are those of `attenuation.fine_rules`, and DIP.
     """
     points, weights, nodes, searching, refined, refined_weights, dip = rules
-    gauss, intervals = points.shape[0], first.shape[0]
-    traced = 10 if states.shape[2] >= 10 else 0
-    states_rows, slopes_rows, geometry, weight = (
-        aligned(6, BLOCK),
-        aligned(6, BLOCK),
-        aligned(10, BLOCK),
-        aligned(10, BLOCK),
-    )
-    y, k, g, w = states_rows.reshape(-1), slopes_rows.reshape(-1), geometry.reshape(-1), weight.reshape(-1)
-    x, values, gradients, hessians = states_rows[:3], geometry[0], geometry[1:4], geometry[4:]
-    speeds, slopes, bends = weight[0], weight[1:4], weight[4:]
-    # of the jets only those in use are kept
-    jets, bent = aligned(NEAREST * 9, BLOCK).reshape(NEAREST, 9, BLOCK), aligned(intervals + 1, BLOCK)
-    a, sampled, work = aligned(2, BLOCK), aligned(gauss + 2, BLOCK), aligned(4, BLOCK)
+    gauss, intervals = points.shape[0], bent.shape[0]
+    a, work, along = aligned(2, BLOCK), aligned(4, BLOCK), np.empty(gauss + 2)
     power, grown, least, most = work[0], work[1], work[2], work[3]
-    for start in range(0, states.shape[0], BLOCK):
-        count = min(BLOCK, states.shape[0] - start)
+    for start in range(0, out.shape[0], BLOCK):
+        count = min(BLOCK, out.shape[0] - start)
         for i in range(BLOCK):
             ray = start + min(i, count - 1)
             a[0, i], a[1, i] = out[ray, 0, 10], out[ray, 0, 11]
-        known, seen, output = 0, 0, 0
+        output = 0
         for m in range(intervals + 1):
             while output < place.shape[0] and place[output] == m:
                 for i in range(count):
-                    for lane in range(traced):
-                        out[start + i, output, lane] = states[start + i, m, lane]
                     out[start + i, output, 10], out[start + i, output, 11] = a[0, i], a[1, i]
                 output += 1
             if m == intervals or not _any_infinite(a[1]):
                 continue
-            while known <= knots[first[m] + NEAREST - 1]:
-                for i in range(BLOCK):
-                    for lane in range(6):
-                        y[lane * BLOCK + i] = states[start + min(i, count - 1), known, lane]
-                level(x, values, gradients, hessians, level_par)
-                if weighted:
-                    speed(x, speeds, slopes, bends, speed_par)
-                derivative(weighted, 6, pointer(y, 0), pointer(g, 0), pointer(w, 0), pointer(k, 0))
-                _curvature(y, g, w, weighted, bent[known])
-                # what is no knot is overwritten by the next
-                _jet(y, k, w, weighted, jets[seen % NEAREST])
-                if known == knots[seen]:
-                    seen += 1
-                known += 1
-            for i in range(BLOCK):
-                sampled[0, i], sampled[gauss + 1, i] = bent[m, i], bent[m + 1, i]
-                grown[i], least[i], most[i] = 0.0, min(bent[m, i], bent[m + 1, i]), max(bent[m, i], bent[m + 1, i])
             time = times[m + 1] - times[m]
-            for q in range(gauss):
-                _between(position[m, q], velocity[m, q], jets, first[m], y)
-                level(x, values, gradients, hessians, level_par)
-                if weighted:
-                    speed(x, speeds, slopes, bends, speed_par)
-                _curvature(y, g, w, weighted, sampled[q + 1])
+            for q in range(gauss + 2):
                 for i in range(BLOCK):
-                    power[i] = sampled[q + 1, i]
-                    least[i], most[i] = min(least[i], power[i]), max(most[i], power[i])
-                two_thirds(power, weights[q] * time)
-                for i in range(BLOCK):
-                    grown[i] += power[i]
+                    value = bent[m, q, start + min(i, count - 1)]
+                    power[i] = value
+                    least[i] = min(least[i], value) if q > 0 else value
+                    most[i] = max(most[i], value) if q > 0 else value
+                    grown[i] = grown[i] if q > 0 else 0.0
+                if 0 < q <= gauss:
+                    two_thirds(power, weights[q - 1] * time)
+                    for i in range(BLOCK):
+                        grown[i] += power[i]
             for i in range(count):
                 if a[1, i] == math.inf:
                     if least[i] > dip * most[i]:
                         a[0, i] += grown[i]
                         continue
-                    along = sampled[:, i].copy()
+                    for q in range(gauss + 2):
+                        along[q] = bent[m, q, start + i]
                     if _reaches_zero(along, searching):
                         _detach(along, searching, points, weights, nodes, time, times[m], a, i)
                     else:
@@ -263,48 +229,3 @@ def _any_infinite(values):
         if values[i] == math.inf:
             return True
     return False
-
-
-@njit(**options)
-def _curvature(yf, g, w, weighted, out):
-    """c^(3/2) kappa_n along the directions of a block of states, of any length, into out (BLOCK,)."""
-    for i in range(BLOCK):
-        px, py, pz = yf[3 * BLOCK + i], yf[4 * BLOCK + i], yf[5 * BLOCK + i]
-        gx, gy, gz = g[BLOCK + i], g[2 * BLOCK + i], g[3 * BLOCK + i]
-        xx, yy, zz = g[4 * BLOCK + i], g[5 * BLOCK + i], g[6 * BLOCK + i]
-        bent = second_form(px, py, pz, xx, yy, zz, g[7 * BLOCK + i], g[8 * BLOCK + i], g[9 * BLOCK + i])
-        out[i] = bent / ((px * px + py * py + pz * pz) * math.sqrt(gx * gx + gy * gy + gz * gz))
-    if weighted:
-        for i in range(BLOCK):
-            out[i] *= w[i] * math.sqrt(w[i])
-
-
-@njit(**options)
-def _jet(yf, kf, w, weighted, jet):
-    """(x, x', x'') of the block into jet (9, BLOCK), from its derivative; see `attenuation.jets`."""
-    jf = jet.reshape(-1)
-    for i in range(3 * BLOCK):
-        jf[i], jf[3 * BLOCK + i], jf[6 * BLOCK + i] = yf[i], kf[i], kf[3 * BLOCK + i]
-    if weighted:
-        for i in range(BLOCK):
-            faster = w[BLOCK + i] * kf[i] + w[2 * BLOCK + i] * kf[BLOCK + i] + w[3 * BLOCK + i] * kf[2 * BLOCK + i]
-            for lane in range(3):
-                place = lane * BLOCK + i
-                jf[6 * BLOCK + place] = w[i] * kf[3 * BLOCK + place] + faster * yf[3 * BLOCK + place]
-
-
-@njit(**options)
-def _between(position, velocity, jets, first, yf):
-    """(x, x') into yf at the point to which the weights (3 NEAREST,) belong."""
-    for pair in range(0, NEAREST, 2):
-        one, two = jets[(first + pair) % NEAREST].reshape(-1), jets[(first + pair + 1) % NEAREST].reshape(-1)
-        p, v = position[3 * pair :], velocity[3 * pair :]
-        p0, p1, p2, p3, p4, p5 = p[0], p[1], p[2], p[3], p[4], p[5]
-        v0, v1, v2, v3, v4, v5 = v[0], v[1], v[2], v[3], v[4], v[5]
-        if pair == 0:
-            yf[:] = 0.0
-        for i in range(3 * BLOCK):
-            a0, a1, a2 = one[i], one[3 * BLOCK + i], one[6 * BLOCK + i]
-            b0, b1, b2 = two[i], two[3 * BLOCK + i], two[6 * BLOCK + i]
-            yf[i] += p0 * a0 + p1 * a1 + p2 * a2 + p3 * b0 + p4 * b1 + p5 * b2
-            yf[3 * BLOCK + i] += v0 * a0 + v1 * a1 + v2 * a2 + v3 * b0 + v4 * b1 + v5 * b2

@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 
 from creeping.geodesics.kernels.attenuation import SAMPLES, extend
-from creeping.kernels.block import BLOCK, aligned, entry_options, options, strict_inlined
+from creeping.kernels.block import BLOCK, aligned, entry_options, options, strict_inlined, strict_options
 from creeping.kernels.contraction import contraction
 from creeping.kernels.splines import cells_and_fractions, weights
 from creeping.phaseflow.kernels import rotation as _angles
@@ -118,15 +118,17 @@ def leap_block(kind, leap, extras, degree, uva, place, odd, count, r, m, w, d, m
         weights(uva[0], degree, wu)
     weights(uva[1], degree, wv)
     weights(uva[2], degree, wa)
+    for i in range(count):
+        mine[i] = i
     packed = extras > 0 and jacobi.shape[4] == 8
     pf = d[4 * BLOCK :].reshape(-1)
     if packed:
-        interpolate(jacobi, degree, place, wu, wv, wa, count, pf)
+        interpolate(jacobi, degree, place, wu, wv, wa, mine, count, pf)
         _unpack(kind, pf, matrix, centre, df, ef)
     else:
-        interpolate(table, degree, place, wu, wv, wa, count, df)
+        interpolate(table, degree, place, wu, wv, wa, mine, count, df)
         if extras:
-            interpolate(jacobi, degree, place, wu, wv, wa, count, ef)
+            interpolate(jacobi, degree, place, wu, wv, wa, mine, count, ef)
     if kind == FOLDED:
         _unfold(df, odd)
     move(kind, rf, df, centre)
@@ -142,7 +144,7 @@ def leap_block(kind, leap, extras, degree, uva, place, odd, count, r, m, w, d, m
                 else:
                     mine[some] = i
                     some += 1
-        interpolate_some(curvature, degree, place, wu, wv, wa, mine, some, d[2 * BLOCK : 4 * BLOCK].reshape(-1))
+        interpolate(curvature, degree, place, wu, wv, wa, mine, some, d[2 * BLOCK : 4 * BLOCK].reshape(-1))
     return some
 
 
@@ -258,62 +260,34 @@ def flow(
     return True
 
 
-@njit(**options)
-def interpolate(table, degree, first, wu, wv, wa, count, out):
-    """Stencil sums of the first ``count`` rays of a block: out (BLOCK, lanes), flat.
+@njit(**strict_options)
+def interpolate(table, degree, first, wu, wv, wa, rays, count, out):
+    """Stencil sums of the rays rays[:count] of a block, one after the other in out (BLOCK, lanes), flat.
 
     ``first`` holds the number of each stencil's first coefficient; for the weights see `creeping.kernels.splines`. A
     table with one plane has no axis u.
     """
-    lanes = table.shape[4]
-    row = table.shape[3]
-    plane = row * table.shape[2]
-    su, sv = lanes * plane, lanes * row
-    if table.shape[1] == 1:
+    lanes, row = table.shape[4], table.shape[3]
+    su, sv, flat = lanes * row * table.shape[2], lanes * row, table.shape[1] == 1
+    for j in range(count):
+        i = rays[j]
+        at, to = lanes * first[i], lanes * j
         if lanes == 4 and degree == 3:
-            for i in range(count):
-                _flat_3_4(table, 4 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 4 * i)
+            if flat:
+                _flat_3_4(table, at, su, sv, wu, wv, wa, i, BLOCK, out, to)
+            else:
+                _sum_3_4(table, at, su, sv, wu, wv, wa, i, BLOCK, out, to)
         elif lanes == 4:
-            for i in range(count):
-                _flat_5_4(table, 4 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 4 * i)
+            if flat:
+                _flat_5_4(table, at, su, sv, wu, wv, wa, i, BLOCK, out, to)
+            else:
+                _sum_5_4(table, at, su, sv, wu, wv, wa, i, BLOCK, out, to)
         elif degree == 3:
-            for i in range(count):
-                _flat_3_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * i)
+            if flat:
+                _flat_3_8(table, at, su, sv, wu, wv, wa, i, BLOCK, out, to)
+            else:
+                _sum_3_8(table, at, su, sv, wu, wv, wa, i, BLOCK, out, to)
+        elif flat:
+            _flat_5_8(table, at, su, sv, wu, wv, wa, i, BLOCK, out, to)
         else:
-            for i in range(count):
-                _flat_5_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * i)
-    elif lanes == 4 and degree == 3:
-        for i in range(count):
-            _sum_3_4(table, 4 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 4 * i)
-    elif lanes == 4:
-        for i in range(count):
-            _sum_5_4(table, 4 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 4 * i)
-    elif degree == 3:
-        for i in range(count):
-            _sum_3_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * i)
-    else:
-        for i in range(count):
-            _sum_5_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * i)
-
-
-@njit(**options)
-def interpolate_some(table, degree, first, wu, wv, wa, mine, some, out):
-    """Eight-lane sums of the rays mine[:some] of a block, one after the other in ``out``; see `interpolate`."""
-    row = table.shape[3]
-    su, sv = 8 * row * table.shape[2], 8 * row
-    if table.shape[1] == 1 and degree == 3:
-        for j in range(some):
-            i = mine[j]
-            _flat_3_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * j)
-    elif table.shape[1] == 1:
-        for j in range(some):
-            i = mine[j]
-            _flat_5_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * j)
-    elif degree == 3:
-        for j in range(some):
-            i = mine[j]
-            _sum_3_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * j)
-    else:
-        for j in range(some):
-            i = mine[j]
-            _sum_5_8(table, 8 * first[i], su, sv, wu, wv, wa, i, BLOCK, out, 8 * j)
+            _sum_5_8(table, at, su, sv, wu, wv, wa, i, BLOCK, out, to)
