@@ -173,6 +173,7 @@ def run(
     words = {name: value for name, value in locals().items() if name not in ("body", "file", "output", "json_")}
     words |= file.given()
     del words["resume"]
+    _upkeep.compile_ahead()
     import numpy as np
 
     import creeping as cr

@@ -39,7 +39,7 @@ class _FirstUse(events.Listener):  # type: ignore[misc]
 
     def __init__(self, folder: Path, digest: str) -> None:
         self._folder, self._digest = folder, digest
-        self._lock, self.depth, self._told = threading.Lock(), 0, False
+        self._lock, self.depth, self._told, self._begun = threading.Lock(), 0, False, False
         self._thresholds = gc.get_threshold()
 
     def on_start(self, event: Any) -> None:
@@ -58,8 +58,13 @@ class _FirstUse(events.Listener):  # type: ignore[misc]
         if multiprocessing.parent_process() is not None or AHEAD in sys.modules:
             return
         logging.getLogger("creeping").warning("creeping: compiling kernels, once for this installation: up to a minute")
-        if may_start(self._folder, self._digest):
-            start(module, self._folder, self._digest)
+        self.begin(module)
+
+    def begin(self, first: str) -> None:
+        """Compile ahead from now on, once."""
+        if not self._begun and may_start(self._folder, self._digest):
+            self._begun = True
+            start(first, self._folder, self._digest)
 
     def on_end(self, event: Any) -> None:
         """Have the garbage collected as before."""
@@ -74,6 +79,12 @@ def watch(folder: Path, digest: str) -> None:
     versions = f"{digest} numba {version('numba')} {sys.implementation.cache_tag}"
     _watching.append(_FirstUse(folder, versions))
     events.register("numba:compile", _watching[-1])
+
+
+def begin(first: str) -> None:
+    """Compile ahead for who comes to the kernels of the module ``first`` soon."""
+    for listener in _watching:
+        listener.begin(first)
 
 
 def is_compiling() -> bool:

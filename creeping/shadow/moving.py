@@ -43,8 +43,8 @@ def moved_onto_lines(body: Surface, waves: FloatArray, points: FloatArray, *, re
     """
     from creeping.shadow.kernels.newton import move, work_space
 
-    # copies: of arrays that cannot be written kernels would be compiled once more
-    waves = np.array(np.broadcast_to(rows_of(waves), (len(points), 4)))
+    # of arrays of another kind kernels would be compiled once more
+    waves = np.array(np.broadcast_to(rows_of(waves), (len(points), 4)), order="C")
     n, found = len(points), np.array(points, dtype=float, order="C")
     tangents, curvature, left = np.empty_like(found), np.empty(n), np.empty(n)
     with evaluators(body) as parts:

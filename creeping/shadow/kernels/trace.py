@@ -114,7 +114,7 @@ def _walk(mesh, wave, s, marks, number, crossings, first):
     nx, ny, nz, x, y, z = normals[0], normals[1], normals[2], vertices[0], vertices[1], vertices[2]
     for i in range(s.shape[0]):
         s[i] = nx[i] * (a + w * x[i]) + ny[i] * (b + w * y[i]) + nz[i] * (c + w * z[i])
-    total, curves, least = 0, 0, (APART * edge) ** 2
+    total, curves, least = np.int64(0), 0, (APART * edge) ** 2
     first[0] = 0
     for begin in range(triangles.shape[0]):
         lit = (s[triangles[begin, 0]] < 0.0) + (s[triangles[begin, 1]] < 0.0) + (s[triangles[begin, 2]] < 0.0)
