@@ -67,9 +67,9 @@ class PortRays:
         Change of A with the place of each end along b = n x p there, the other end held.
     error : (m,), L
         Of the arclength, by polynomials of lower degree.
-    folds, ended : (n, n), L^(1/3)
-        Least A at which rays merge close to a port, and of rays that pass close to it after kappa_n has fallen to 0,
-        from the lower number; inf where none do.
+    folds, ended : (s, n), L^(1/3)
+        Of the s ports that send fans, the first ones: least A at which rays merge close to a port of higher number, and
+        of rays that pass close to it after kappa_n has fallen to 0; inf where none do.
     """
 
     body: Surface
@@ -97,34 +97,15 @@ class PortRays:
         """Number of geodesics."""
         return len(self.first)
 
-    def among(self, begin: int, end: int) -> "PortRays":
-        """Those between ports of these numbers, which count from 0 then."""
-        ports = slice(begin, end)
-        found = self.chosen((self.first >= begin) & (self.second < end))
-        return replace(
-            found,
-            ports=self.ports[ports],
-            normals=self.normals[ports],
-            first=found.first - begin,
-            second=found.second - begin,
-            folds=self.folds[ports, ports],
-            ended=self.ended[ports, ports],
-        )
-
-    def across(self, count: int) -> "PortRays":
-        """Those from the first so many ports to the others."""
-        found = self.chosen((self.first < count) & (self.second >= count))
-        folds, ended = (np.full_like(whole, np.inf) for whole in (self.folds, self.ended))
-        folds[:count, count:], ended[:count, count:] = self.folds[:count, count:], self.ended[:count, count:]
-        return replace(found, folds=folds, ended=ended)
-
-    def chosen(self, some: BoolArray) -> "PortRays":
-        """Some of the geodesics, between the same ports."""
-        names = ("first", "second", "arclength", "points", "directions", "spreading", "rates", "caustics", "curvature")
-        parts: dict[str, Any] = {
-            name: getattr(self, name)[some] for name in (*names, "torsion", "bend", "integrals", "turning", "error")
-        }
-        return replace(self, **parts)
+    def between(self, sources: BoolArray, receivers: BoolArray) -> "PortRays":
+        """Those from some of the n ports (n,) to some, whose numbers stay."""
+        some = sources[self.first] & receivers[self.second]
+        ends = "first", "second", "points", "directions", "rates", "curvature", "torsion", "bend", "turning"
+        whole = "arclength", "spreading", "caustics", "integrals", "error"
+        parts: dict[str, Any] = {name: getattr(self, name)[some] for name in (*ends, *whole)}
+        pairs = np.outer(sources, receivers)[: len(self.folds)]
+        folds, ended = (np.where(pairs, least, np.inf) for least in (self.folds, self.ended))
+        return replace(self, folds=folds, ended=ended, **parts)
 
 
 def tangent_frames(normals: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -174,7 +155,7 @@ def rays_between(
     boxes = _boxes(ports)
     senders = len(ports) if sources is None else sources
     within_budget(24.0 * PER_PAIR * (LANES + START + 3) * len(ports) * senders, f"{len(ports)} ports", "ask for fewer")
-    folds = np.full((2, len(ports), len(ports)), np.inf)
+    folds = np.full((2, senders, len(ports)), np.inf)
     owners, rows, wide = [], [], []
     counts = _ray_counts(body, ports[:senders], normals[:senders], times)
     for rays in np.unique(counts):

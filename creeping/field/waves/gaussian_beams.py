@@ -21,11 +21,11 @@ from creeping.geometry.surface import Surface, size
 from creeping.kernels.threads import in_threads
 
 WIDTH = 2.5
-"""Eps/a from a point, eps a from a line: free [F24], and what another width changes is part of every error."""
+"""Eps/a from a point, eps a from a line: free (F24), and what another width changes is part of every error."""
 REACH = 0.9
 """How far a beam reaches, in terms of a: (ka)^(1/2) of its widths, so that nothing is lost from ka = 10 on."""
 MOST_TURNED = 0.5
-"""Bound of |k_c/k - 1|, which is tau/2m^2 of a mode [F24] and infinite where y is 0."""
+"""Bound of |k_c/k - 1|, which is tau/2m^2 of a mode (F24) and infinite where y is 0."""
 SECONDS = 2e-8
 """Of a beam's block of steps at one point, for shares of threads alone."""
 
