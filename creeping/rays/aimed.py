@@ -14,7 +14,7 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geodesics.states import P, X
-from creeping.geometry.curvature import second_form
+from creeping.geometry.curvature import bending, second_form
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import normal, size
 from creeping.rays.quantities import STRAIGHT, RayPoints
@@ -197,10 +197,8 @@ class _Search:
         lanes = rays.lanes
         lanes[:, :8] = self.ends[some]
         x, p, J, rate = lanes[:, X], lanes[:, P], lanes[:, 6], lanes[:, 7]
-        gradient = self.tracer.body.gradient(x)
-        g = np.linalg.norm(gradient, axis=1)
-        hessian = self.tracer.body.hessian(x) / g[:, None, None]
-        lanes[:, 9], lanes[:, 12] = (second_form(v, hessian) for v in (p, np.cross(gradient / g[:, None], p)))
+        n, hessian = bending(self.tracer.body, x)
+        lanes[:, 9], lanes[:, 12] = (second_form(v, hessian) for v in (p, np.cross(n, p)))
         # the angle of these J and J', on the branch that the ray has come to
         angle = np.arctan2(-rays.scale * rate, J)
         lanes[:, 8] = angle + 2 * np.pi * np.round((lanes[:, 8] - angle) / (2 * np.pi))
@@ -215,11 +213,9 @@ class _Search:
         """Move some starts along their lines and times along their rays, by no more than a cell; steps wanted (n,)."""
         x, p, J, rate = (self.ends[some, part] for part in (X, P, 6, 7))
         gap = self.observers[some] - p / np.linalg.norm(p, axis=1, keepdims=True)
-        gradient = self.tracer.body.gradient(x)
-        g = np.linalg.norm(gradient, axis=1)
-        n = gradient / g[:, None]
+        n, hessian = bending(self.tracer.body, x)
         b = np.cross(n, p)
-        bend = np.einsum("nij,nj->ni", self.tracer.body.hessian(x), p) / g[:, None]
+        bend = np.einsum("nij,nj->ni", hessian, p)
         torsion, kappa = (np.sum(v * bend, axis=1) for v in (b, p))
         directions, cell = self.directions[some], self.cell[some]
         first = normal(self.tracer.body, self.starts[some])

@@ -17,6 +17,7 @@ from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.equations import sharpest_curvature
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import M12, WITH_JACOBI, pack
+from creeping.geometry.directions import tangent_frames
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import Surface, normal, size
 from creeping.storage.memory import within_budget
@@ -106,14 +107,6 @@ class PortRays:
         pairs = np.outer(sources, receivers)[: len(self.folds)]
         folds, ended = (np.where(pairs, least, np.inf) for least in (self.folds, self.ended))
         return replace(self, folds=folds, ended=ended, **parts)
-
-
-def tangent_frames(normals: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Two unit tangents at each normal, right-handed with it: (n, 3) -> (n, 3), (n, 3)."""
-    least = np.argmin(np.abs(normals), axis=1)
-    one = np.cross(normals, np.eye(3)[least])
-    one /= np.linalg.norm(one, axis=1, keepdims=True)
-    return one, np.cross(normals, one)
 
 
 def departures(normals: FloatArray, angles: FloatArray) -> FloatArray:

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 
 from creeping._presenting import Drawn, brief
-from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
+from creeping._typing import Any, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.field.results.labelled import ArrayResult, power
-from creeping.field.results.point_result import FieldStatus
+from creeping.field.results.point_result import WithStatus
 from creeping.geometry.surface import Surface
 from creeping.rays.port_rays import PortRays
 from creeping.storage.memory import required
@@ -72,7 +72,7 @@ class CouplingPaths:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Coupling(ArrayResult, Drawn):
+class Coupling(ArrayResult, WithStatus, Drawn):
     """Matrix of fields between ports on a body; entry (i, j) is the field at port j of a unit source at port i.
 
     The field is u of e^{ikr}/(4 pi r) for `coupling`, H along slot j of a magnetic dipole along slot i for
@@ -145,11 +145,6 @@ class Coupling(ArrayResult, Drawn):
         return self.values[index]
 
     @property
-    def ok(self) -> BoolArray:
-        """Where the status is OK (n, n)."""
-        return np.asarray(self.status == FieldStatus.OK)
-
-    @property
     def db(self) -> FloatArray:
         """20 log10 of the values' size (n, n), dB re 1 `unit`; inf on the diagonal."""
         with np.errstate(divide="ignore"):
@@ -159,11 +154,6 @@ class Coupling(ArrayResult, Drawn):
     def unit(self) -> str:
         """Unit of the values: "1/L" for points, "1/L^2" for slots and monopoles, with the body's unit of length."""
         return self._kind[0]
-
-    @property
-    def status_counts(self) -> dict[str, int]:
-        """Number of entries by name of status; only statuses that occur."""
-        return {s.name: int(np.sum(self.status == s)) for s in FieldStatus if np.any(self.status == s)}
 
     def paths(self, source: int, receiver: int) -> CouplingPaths:
         """Geodesics from one port to another, and the contribution of each.

@@ -97,7 +97,7 @@ def coupling(
     """
     k = checked_wave(body, wavenumber, order, "ports", boundary)
     y = _checked_ports(body, ports)
-    return _coupled(body, y, None, ["point"] * len(y), k, order, length)
+    return _coupled(body, y, None, ["point"] * len(y), k, order, length, boundary_name(boundary))
 
 
 def slot_coupling(
@@ -372,6 +372,7 @@ def _coupled(
     k: float,
     order: int,
     length: float | Literal["auto"],
+    boundary: str = "pec",
 ) -> Coupling:
     """The matrix of ports of given kinds, slots first, which have axes."""
     named, n = np.array(kinds), len(ports)
@@ -381,17 +382,17 @@ def _coupled(
     if axes is not None:
         along[slots] = _tangential(axes, along[slots])
     rays = port_geodesics(body, ports, k, length)
-    whole, waves = None, np.zeros(len(rays), dtype=complex)
+    blocks, waves = [], np.zeros(len(rays), dtype=complex)
     for pair in TENSORS:
         sources, receivers = (named == kind for kind in pair)
         if not (np.any(sources) and np.any(receivers)):
             continue
         made = path_waves(rays.between(sources, receivers), pair, along, k, order)
         waves[sources[rays.first] & receivers[rays.second]] = made.values
-        found = port_sums(made)
-        whole = whole or found
-        whole.put(found, np.outer(sources, receivers))
-    assert whole is not None
+        blocks.append((port_sums(made), np.outer(sources, receivers)))
+    whole = blocks[0][0]
+    for block, where in blocks[1:]:
+        whole.put(block, where)
     sign = np.where(named[:, None] == named, 1, -1)
 
     def square(upper: Any, lower: Any, diagonal: Any) -> Any:
@@ -408,7 +409,7 @@ def _coupled(
         status=square(whole.status, whole.status.T, int(FieldStatus.CAUSTIC)),
         method=square(whole.method, whole.method.T, "none"),
         wavenumber=k,
-        boundary="hard" if kinds[0] == "point" else "pec",
+        boundary=boundary,
         order=order,
         length=rays.length,
         length_unit=unit_of(body),

@@ -21,7 +21,8 @@ from creeping.geometry.surface import Surface, size
 from creeping.kernels.threads import in_threads
 
 WIDTH = 2.5
-"""Eps/a from a point, eps a from a line: free (F24), and what another width changes is part of every error."""
+"""Eps/a from a point, eps a from a line: free (F24); what another one changes is part of the error, and within it
+(``tests/field/test_port_beams.py``)."""
 REACH = 0.9
 """How far a beam reaches, in terms of a: (ka)^(1/2) of its widths, so that nothing is lost from ka = 10 on."""
 MOST_TURNED = 0.5
