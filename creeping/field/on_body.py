@@ -60,9 +60,9 @@ from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.quadrature import nodes_at
 from creeping.geometry.surface import normal, size
 from creeping.rays.fan import RayFan
-from creeping.rays.fan_points import ray_points
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import shed_on
+from creeping.rays.strips import ray_points
 
 SCALAR: dict[str, BoundaryLike] = {"soft": "soft", "hard": "hard"}
 

@@ -34,9 +34,9 @@ from creeping.geometry.piecewise import is_piecewise, piece_ahead, pieces_of
 from creeping.geometry.quadrature import BodyNodes, body_nodes, nearest_points, nodes_at
 from creeping.geometry.surface import Surface, normal, size
 from creeping.rays.fan import RayFan, launch
-from creeping.rays.fan_points import ray_points
 from creeping.rays.quantities import SHARPEST, STEEPEST, RayPoints
 from creeping.rays.reach import ray_length
+from creeping.rays.strips import ray_points
 from creeping.shadow.attachment import occluded
 from creeping.shadow.line import ShadowLine
 from creeping.shadow.status import ATTACHED
