@@ -20,12 +20,12 @@ from .field.far import far_field as far_field
 from .field.frequency import wavenumber as wavenumber
 from .field.near import near_field as near_field
 from .field.on_body import surface_field as surface_field
-from .field.ports.antennas import antenna_coupling as antenna_coupling
-from .field.ports.antennas import monopole_coupling as monopole_coupling
-from .field.ports.antennas import slot_coupling as slot_coupling
 from .field.ports.coupling_result import Coupling as Coupling
 from .field.ports.coupling_result import CouplingPaths as CouplingPaths
-from .field.ports.coupling_result import coupling as coupling
+from .field.ports.couplings import antenna_coupling as antenna_coupling
+from .field.ports.couplings import coupling as coupling
+from .field.ports.couplings import monopole_coupling as monopole_coupling
+from .field.ports.couplings import slot_coupling as slot_coupling
 from .field.ports.port_map import PortField as PortField
 from .field.ports.port_map import port_field as port_field
 from .field.results.comparison import Comparison as Comparison

@@ -48,8 +48,8 @@ from creeping.field.marching.fan_waves import fan_waves, march_alone, marchable,
 from creeping.field.results.point_result import FieldStatus, PointValues, SurfaceField, Words, judged, measured_field
 from creeping.field.special.fock import surface_function
 from creeping.field.validity_range import validity
-from creeping.field.waves.beams import length_scale
 from creeping.field.waves.far_geometry import fan_strips
+from creeping.field.waves.gaussian_beams import beam_length
 from creeping.field.waves.ray_sums import NARROW_ALONE, RaySum, own_error, ray_sum, tube_share
 from creeping.field.waves.surface import scalar_boundary, surface_waves
 from creeping.geodesics.bundle import as_points, on_body
@@ -60,9 +60,9 @@ from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.quadrature import nodes_at
 from creeping.geometry.surface import normal, size
 from creeping.rays.fan import RayFan
-from creeping.rays.fan_points import ray_points
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import shed_on
+from creeping.rays.strips import ray_points
 
 SCALAR: dict[str, BoundaryLike] = {"soft": "soft", "hard": "hard"}
 
@@ -335,7 +335,7 @@ def _by_marching(fan: RayFan, rays: RayPoints, k: float, kind: Boundary) -> tupl
 
 def _wide(fan: RayFan, rays: RayPoints, k: float) -> FloatArray:
     """The same measure (rays, steps) where the ground need not be convex, in terms of the body's size."""
-    a = length_scale(fan)
+    a = beam_length(fan.body)
     share = np.abs(rays.spreading) / (np.abs(rays.spreading) + a * np.abs(rays.spreading_rate))
     return np.asarray(share * np.cbrt(0.5 * k * a))
 

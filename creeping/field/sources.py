@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creeping._presenting import Drawn
-from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
+from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError, SingularIncidenceError
 from creeping.field.arguments import checked, checked_plain, observers_of
 from creeping.field.boundary import BoundaryLike, boundary_name
 from creeping.field.near import MISSING, near_field
 from creeping.field.results.labelled import ArrayResult, directed
-from creeping.field.results.point_result import FieldStatus, NearField
+from creeping.field.results.point_result import FieldStatus, NearField, WithStatus
 from creeping.field.waves.surface import scalar_boundary
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.checks import unit_of
@@ -42,7 +42,7 @@ N_RAYS = 48
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SourcePattern(ArrayResult, Drawn):
+class SourcePattern(ArrayResult, WithStatus, Drawn):
     """Far fields F of s point sources in m directions; usable as the array of its values.
 
     Attributes
@@ -85,20 +85,10 @@ class SourcePattern(ArrayResult, Drawn):
     length_unit: str = field(default="L", kw_only=True)
 
     @property
-    def ok(self) -> BoolArray:
-        """Where the status is OK (m, s)."""
-        return np.asarray(self.status == FieldStatus.OK)
-
-    @property
     def decibels(self) -> FloatArray:
         """20 log10 |F| (m, s), dB relative to the source without the body; -inf where F is 0."""
         with np.errstate(divide="ignore"):
             return np.asarray(20 * np.log10(np.abs(self.values)))
-
-    @property
-    def status_counts(self) -> dict[str, int]:
-        """Number of values by name of status; only statuses that occur."""
-        return {s.name: int(np.sum(self.status == s)) for s in FieldStatus if np.any(self.status == s)}
 
     def to_xarray(self) -> xarray.Dataset:
         """``xarray.Dataset`` of values, error and status, by direction and source."""

@@ -45,6 +45,21 @@ def normal_curvature(body: Surface, points: FloatArray, directions: FloatArray) 
     return np.asarray(bent / np.linalg.norm(body.gradient(points), axis=-1))
 
 
+def bending(body: Surface, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Normals n and H/|grad F|, 1/L, whose second form is the curvature of tangents: (n, 3), (n, 3, 3).
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> n, H = bending(sc.Sphere(radius=2.0), np.array([[2.0, 0.0, 0.0]]))
+    >>> n.tolist(), float(second_form(np.array([[0.0, 1.0, 0.0]]), H)[0])
+    ([[1.0, 0.0, 0.0]], 0.5)
+    """
+    gradient = body.gradient(points)
+    g = np.linalg.norm(gradient, axis=1)
+    return gradient / g[:, None], body.hessian(points) / g[:, None, None]
+
+
 def second_form(directions: FloatArray, hessians: FloatArray) -> FloatArray:
     """p.Hp of vectors p and matrices H of any unit: (..., 3), (..., 3, 3) -> (...)."""
     return np.asarray(np.einsum("...i,...ij,...j->...", directions, hessians, directions))

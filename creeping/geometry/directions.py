@@ -3,7 +3,7 @@
 A direction is where the wave travels. theta is measured from z, phi and the azimuth from x towards y, the elevation
 from the plane of x and y; all in radians.
 
-Also here: solutions found more than once: the first of each.
+Also here: tangents at a normal, and solutions found more than once: the first of each.
 
 Sources: [G10], [LL99], [W06]; Derivations, B9.
 """
@@ -22,6 +22,22 @@ LEBEDEV_ORDERS = (
     *range(3, 33, 2),
     *range(35, 132, 6),
 )
+
+
+def tangent_frames(normals: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Two unit tangents at each unit normal, right-handed with it: (..., 3) -> (..., 3), (..., 3).
+
+    The first is across that axis of space which the normal is farthest from.
+
+    Examples
+    --------
+    >>> one, two = tangent_frames(np.array([0.0, 0.0, 1.0]))
+    >>> one.tolist(), two.tolist()
+    ([0.0, 1.0, 0.0], [-1.0, 0.0, 0.0])
+    """
+    one = np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=-1)])
+    one /= np.linalg.norm(one, axis=-1, keepdims=True)
+    return one, np.cross(normals, one)
 
 
 def directions_from_angles(theta: ArrayLike, phi: ArrayLike) -> FloatArray:

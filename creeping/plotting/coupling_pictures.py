@@ -19,6 +19,7 @@ from creeping.field.ports.port_map import PortField, port_field
 from creeping.field.results.comparison import decibels, shown_range
 from creeping.field.results.labelled import power
 from creeping.field.results.point_result import FieldStatus
+from creeping.geometry.directions import tangent_frames
 from creeping.geometry.piecewise import drawn_mesh
 from creeping.geometry.surface import Surface, normal, project, size
 from creeping.plotting import pages
@@ -109,11 +110,9 @@ def coupling_levels(field: PortField) -> FloatArray:
 
 def _ring(body: Surface, point: FloatArray, n: FloatArray) -> FloatArray:
     """Closed curve (k, 3) on the body round a point, of a twentieth of the body's size."""
-    one = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
-    one /= np.linalg.norm(one)
+    one, two = tangent_frames(n)
     angle = np.linspace(0, 2 * np.pi, 49)[:, None]
-    radius = 0.05 * size(body)
-    return project(body, point + radius * (np.cos(angle) * one + np.sin(angle) * np.cross(n, one)))
+    return project(body, point + 0.05 * size(body) * (np.cos(angle) * one + np.sin(angle) * two))
 
 
 def plot_coupling(

@@ -4,8 +4,8 @@ They are found by Newton's method on p(σ, s) = r, with p and b = n x p at the e
 
     b.(r - p) = J' dσ⊥,   n.(r - p) = -κₙ (dt + d.T dσ) - τ J dσ⊥,   τ = b.Hp/|grad F|,
 
-dσ along the line, whose tangent T need not be across d, and dσ⊥ = b0.T dσ. Rays of longer steps than those of what is
-found tell enough; on a body with creases nothing but the ends of rays.
+dσ along the line, whose tangent T need not be across d, and dσ⊥ = b0.T dσ. On a body with creases nothing but the ends
+of rays is traced on the way.
 
 Sources: Derivations, R12.
 """
@@ -14,12 +14,11 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geodesics.states import P, X
-from creeping.geometry.curvature import second_form
+from creeping.geometry.curvature import bending, second_form
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import normal, size
 from creeping.rays.quantities import STRAIGHT, RayPoints
-from creeping.rays.reach import SingleRays
-from creeping.rays.tracer import RayTracer
+from creeping.rays.tracer import RayTracer, SingleRays
 
 CLOSE = 1e-6
 """Residual at which the search for a ray ends, radians: its phase is stationary there, and errs by the square."""
@@ -36,9 +35,6 @@ CROWDED, STEP, STEP_ON_PIECES, LEAST_CELL = 500, 8.0, 2.0, 0.008
 """Searches of one direction that are so many that a fan folds finely: IDLE ends some there, and the first step of
 Newton's method, in cells, from which on nothing is a cell away. On bodies with creases always, and cells of dense fans
 count as cells of so many body sizes: what is near does not hang on the number of rays."""
-LONG = (2, 1)
-"""Steps of the searches on a smooth body, in steps of what they find: points err less than derivatives of curvature
-do."""
 NEARLY = 2e-4
 """Residual from which a step is taken to end the search, which converges by squares; what it finds is looked at."""
 MORE, HOPE = 3, 0.25
@@ -74,39 +70,23 @@ def rays_towards(
     found, moved : (m,)
         Their rows, and how far along the line they start from where the search began, in cells.
     """
-    missing, parts = np.arange(len(times)), []
     together = np.ones(len(times), dtype=np.int64) if together is None else together
-    piecewise = is_piecewise(tracer.body)
-    levels = (1,) if piecewise else LONG
-    longest = np.full(len(times), STEP_ON_PIECES) if piecewise else np.where(together > CROWDED, STEP, np.inf)
-    for number, long in enumerate(levels):
-        if number and not len(missing):
-            break
-        rows = directions[missing], observers[missing], near[missing], times[missing], cell[missing], longest[missing]
-        search = _Search(tracer, *rows, long, NEARLY if long == levels[0] else 0.0)
-        rays, found = search.result()
-        parts.append((rays, missing[found], search.moved[found]))
-        # those that were not given up, or that steps so long led astray
-        open_still = search.unsure
-        open_still[found] = False
-        missing = missing[open_still]
-    result = SingleRays.joined([part[0] for part in parts])
-    found, moved = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
-    order = np.argsort(found)
-    return result[order], found[order], moved[order]
+    if is_piecewise(tracer.body):
+        longest = np.full(len(times), STEP_ON_PIECES)
+    else:
+        longest = np.where(together > CROWDED, STEP, np.inf)
+    search = _Search(tracer, directions, observers, near, times, cell, longest)
+    rays, found = search.result()
+    return rays, found, search.moved[found]
 
 
 class _Search:
-    """What `rays_towards` finds with steps of so many, without another look after one from a residual of ``nearly``.
-
-    None whose first step would be longer than ``longest`` (n,), in cells.
+    """What `rays_towards` finds; nothing where the first step would be longer than ``longest`` (n,), in cells.
 
     Attributes
     ----------
     moved : (n,)
         How far along the line each has come, in cells.
-    unsure : (n,)
-        Which may have a ray yet: of those that can be given up, the ones that ended next to one or did not end.
     """
 
     def __init__(
@@ -118,8 +98,6 @@ class _Search:
         times: FloatArray,
         cell: FloatArray,
         longest: FloatArray,
-        long: int,
-        nearly: float,
     ) -> None:
         n = len(times)
         self.tracer, self.directions, self.observers, self.cell = tracer, directions, observers, cell
@@ -129,13 +107,12 @@ class _Search:
         self.piecewise = is_piecewise(tracer.body)
         self.wide = np.maximum(cell, LEAST_CELL * size(tracer.body)) if self.piecewise else cell
         self.far = FAR_ON_PIECES if self.piecewise else FAR
-        trusted = np.isinf(longest)
-        patience = np.where(trusted, ROUNDS, IDLE_ON_PIECES if self.piecewise else IDLE)
+        patience = np.where(np.isinf(longest), ROUNDS, IDLE_ON_PIECES if self.piecewise else IDLE)
         idle, best = np.zeros(n, dtype=np.int64), np.full(n, np.inf)
         active, self.wanted = np.arange(n), np.zeros(n, dtype=bool)
         for number in range(ROUNDS):
-            residual, crossed = self._off(active, long), self._crossed(active)
-            self.wanted[active] = residual <= max(CLOSE, nearly)
+            residual, crossed = self._off(active), self._crossed(active)
+            self.wanted[active] = residual <= NEARLY
             # curvature jumps at a joint: the first step across it may go too far
             idle[active] = np.where((residual <= SLOW * best[active]) | crossed, 0, idle[active] + 1)
             best[active] = np.fmin(residual, best[active])
@@ -148,7 +125,6 @@ class _Search:
             active = last[~self.wanted[last] & (idle[last] < patience[last])]
             if not len(active):
                 break
-        self.unsure = trusted | (self._within() & (idle < patience))
 
     def result(self) -> tuple[SingleRays, IntArray]:
         """Exact rays that have been found, and their rows."""
@@ -175,13 +151,13 @@ class _Search:
             off[beside] = np.where(now < SLOW * off[beside], now, np.inf)
         return some[off < ACCEPTED]
 
-    def _off(self, some: IntArray, long: int = 1) -> FloatArray:
-        """|r - p| (n,) where some searches are now, on a smooth body with steps of so many."""
+    def _off(self, some: IntArray) -> FloatArray:
+        """|r - p| (n,) where some searches are now."""
         rows = self.directions[some], self.starts[some], self.tangents[some], self.times[some]
         if self.piecewise:
             self.ends[some] = self.tracer.ends(rows[0], rows[1], rows[3])
         else:
-            self.ends[some] = self.tracer.at(*rows, long=long).rays.lanes[:, :8]
+            self.ends[some] = self.tracer.at(*rows, whole=False).rays.lanes[:, :8]
         return _apart(self.ends[some, P], self.observers[some])
 
     def _crossed(self, some: IntArray) -> BoolArray:
@@ -197,10 +173,8 @@ class _Search:
         lanes = rays.lanes
         lanes[:, :8] = self.ends[some]
         x, p, J, rate = lanes[:, X], lanes[:, P], lanes[:, 6], lanes[:, 7]
-        gradient = self.tracer.body.gradient(x)
-        g = np.linalg.norm(gradient, axis=1)
-        hessian = self.tracer.body.hessian(x) / g[:, None, None]
-        lanes[:, 9], lanes[:, 12] = (second_form(v, hessian) for v in (p, np.cross(gradient / g[:, None], p)))
+        n, hessian = bending(self.tracer.body, x)
+        lanes[:, 9], lanes[:, 12] = (second_form(v, hessian) for v in (p, np.cross(n, p)))
         # the angle of these J and J', on the branch that the ray has come to
         angle = np.arctan2(-rays.scale * rate, J)
         lanes[:, 8] = angle + 2 * np.pi * np.round((lanes[:, 8] - angle) / (2 * np.pi))
@@ -215,11 +189,9 @@ class _Search:
         """Move some starts along their lines and times along their rays, by no more than a cell; steps wanted (n,)."""
         x, p, J, rate = (self.ends[some, part] for part in (X, P, 6, 7))
         gap = self.observers[some] - p / np.linalg.norm(p, axis=1, keepdims=True)
-        gradient = self.tracer.body.gradient(x)
-        g = np.linalg.norm(gradient, axis=1)
-        n = gradient / g[:, None]
+        n, hessian = bending(self.tracer.body, x)
         b = np.cross(n, p)
-        bend = np.einsum("nij,nj->ni", self.tracer.body.hessian(x), p) / g[:, None]
+        bend = np.einsum("nij,nj->ni", hessian, p)
         torsion, kappa = (np.sum(v * bend, axis=1) for v in (b, p))
         directions, cell = self.directions[some], self.cell[some]
         first = normal(self.tracer.body, self.starts[some])

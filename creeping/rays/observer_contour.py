@@ -9,13 +9,13 @@ Sources: Derivations, R12, F10 and F11.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
 from scipy.optimize.elementwise import find_root
 
 from creeping._typing import BoolArray, FloatArray, IntArray
+from creeping.geometry.curvature import bending, second_form
 from creeping.geometry.surface import Surface, normal, size
 from creeping.rays.quantities import RayPoints
 from creeping.rays.strips import Strip, gather
@@ -67,44 +67,29 @@ class MidHorizon:
         return cls(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(cls)))
 
 
-class _Seeds(NamedTuple):
-    """Nodes before they are refined: observer, strip, σ, s, weight dσ, each (n,)."""
-
-    observer: IntArray
-    strip: IntArray
-    sigma: FloatArray
-    s: FloatArray
-    weight: FloatArray
-
-    @classmethod
-    def of(cls, row: int, strip: int, sigma: FloatArray, s: FloatArray, weight: FloatArray | float) -> "_Seeds":
-        """Nodes of one observer on one strip."""
-        count = len(sigma)
-        return cls(np.full(count, row), np.full(count, strip), sigma, s, np.broadcast_to(weight, (count,)))
-
-    @classmethod
-    def joined(cls, parts: list["_Seeds"]) -> "_Seeds":
-        """All parts as one."""
-        none = cls.of(0, 0, np.zeros(0), np.zeros(0), 0.0)
-        return cls(*(np.concatenate(columns) for columns in zip(none, *parts, strict=True)))
-
-
-def _polish(strips: tuple[Strip, ...], body: Surface, seeds: _Seeds, directions: FloatArray) -> HorizonRays:
-    """Newton's method along each ray on n.r."""
-    limit = 0.5 * max((strip.cell[1] for strip in strips), default=0.0)
-    r, s = directions[seeds.observer], seeds.s
+def _polished(
+    strips: tuple[Strip, ...],
+    body: Surface,
+    observer: IntArray,
+    strip: IntArray,
+    sigma: FloatArray,
+    s: FloatArray,
+    weight: FloatArray,
+    directions: FloatArray,
+) -> HorizonRays:
+    """Nodes at σ, next to s, with weights dσ (n,), by Newton's method along each ray on n.r."""
+    limit = 0.5 * max((one.cell[1] for one in strips), default=0.0)
+    r = directions[observer]
     for _ in range(3):
-        rays = gather(strips, seeds.strip, seeds.sigma, s)
-        gradient = body.gradient(rays.points)
-        g = np.linalg.norm(gradient, axis=1)
-        n = gradient / g[:, None]
-        turned = np.einsum("nij,nj->ni", body.hessian(rays.points), rays.directions) / g[:, None]
+        rays = gather(strips, strip, sigma, s)
+        n, hessian = bending(body, rays.points)
+        turned = np.einsum("nij,nj->ni", hessian, rays.directions)
         rate = np.sum((turned - np.sum(turned * n, axis=1, keepdims=True) * n) * r, axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
             move = np.nan_to_num(-np.sum(n * r, axis=1) / rate)
         s = np.maximum(s + np.clip(move, -limit, limit), 0.0)
-    rays = gather(strips, seeds.strip, seeds.sigma, s)
-    return HorizonRays(seeds.observer, rays, seeds.weight * rays.width)
+    rays = gather(strips, strip, sigma, s)
+    return HorizonRays(observer, rays, weight * rays.width)
 
 
 def line_crossings(strip: Strip, r: FloatArray) -> list[tuple[float, float, bool]]:
@@ -144,40 +129,31 @@ def forward_nodes(
     counts : (w,)
         Nodes on each interval between crossings with the shadow line.
     """
-    shadow, lit, missing = [], [_MidSeeds.empty()], []
+    none = np.zeros(0, dtype=np.int64)
+    dark, missing = [(none, none, np.zeros(0), np.zeros(0), np.zeros(0))], []
+    lit = [_mid_nodes(line.body, 0, np.zeros((0, 3)), line.direction, np.zeros(0))]
     for row, count in zip(wanted, counts, strict=True):
         r = directions[row]
+        q = (line.direction + r) / np.linalg.norm(line.direction + r)
         nodes, weights = np.polynomial.legendre.leggauss(int(count))
         for k, strip in enumerate(strips):
-            for start, end, dark in line_crossings(strip, r):
+            for start, end, shadow in line_crossings(strip, r):
                 sigma, weight = start + (end - start) * (nodes + 1) / 2, (end - start) / 2 * weights
-                if dark:
+                if shadow:
                     s, found = _first_crossing(strip, line.body, sigma, r)
-                    shadow.append(_Seeds.of(row, k, sigma[found], s[found], weight[found]))
+                    rows = np.full((2, int(found.sum())), [[row], [k]])
+                    dark.append((*rows, sigma[found], s[found], weight[found]))
                 else:
-                    x, across, found = _mid_horizon(strip, line, sigma, r)
-                    lit.append(_MidSeeds(np.full(int(found.sum()), row), x[found], (weight * across)[found]))
+                    x, across, found = _mid_horizon(strip, line, sigma, q)
+                    lit.append(_mid_nodes(line.body, int(row), x[found], q, (weight * across)[found]))
                 if not np.all(found):
                     missing.append(row)
-    nodes_lit = _MidSeeds(*(np.concatenate(columns) for columns in zip(*lit, strict=True)))
+    observer, which, places, times, widths = (np.concatenate(column) for column in zip(*dark, strict=True))
     return (
-        _polish(strips, line.body, _Seeds.joined(shadow), directions),
-        _mid_nodes(line, nodes_lit, directions),
+        _polished(strips, line.body, observer, which, places, times, widths, directions),
+        MidHorizon.joined(lit),
         np.unique(np.array(missing, dtype=np.int64)),
     )
-
-
-class _MidSeeds(NamedTuple):
-    """Nodes of the bisector contour: observer (n,), points (n, 3), weight (n,)."""
-
-    observer: IntArray
-    points: FloatArray
-    weight: FloatArray
-
-    @classmethod
-    def empty(cls) -> "_MidSeeds":
-        """No nodes."""
-        return cls(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros(0))
 
 
 def _first_crossing(strip: Strip, body: Surface, sigma: FloatArray, r: FloatArray) -> tuple[FloatArray, BoolArray]:
@@ -204,15 +180,13 @@ def _first_crossing(strip: Strip, body: Surface, sigma: FloatArray, r: FloatArra
 
 
 def _mid_horizon(
-    strip: Strip, line: ShadowLine, sigma: FloatArray, r: FloatArray
+    strip: Strip, line: ShadowLine, sigma: FloatArray, q: FloatArray
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Points (n, 3) of the bisector contour beside the rays σ, d(arclength across q)/dσ, and whether they were found.
 
     Each is sought from the launch point in the plane of n0 and d: F = 0, n.q = 0, (x - x0).b0 = 0.
     """
     body = line.body
-    q = line.direction + r
-    q = q / np.linalg.norm(q)
     start = strip.at(sigma, np.zeros(len(sigma)))
     x0 = start.points
     b0 = np.cross(start.first_normal, line.direction)
@@ -237,13 +211,8 @@ def _mid_horizon(
     return x, np.abs(np.sum(slope * np.cross(n, q), axis=1)), np.asarray(found)
 
 
-def _mid_nodes(line: ShadowLine, seeds: _MidSeeds, directions: FloatArray) -> MidHorizon:
-    body, x = line.body, seeds.points
-    gradient = body.gradient(x)
-    g = np.linalg.norm(gradient, axis=1)
-    n = gradient / g[:, None]
-    q = line.direction + directions[seeds.observer]
-    q /= np.linalg.norm(q, axis=1, keepdims=True)
-    H = body.hessian(x)
-    along, across = (np.einsum("ni,nij,nj->n", v, H, v) / g for v in (q, np.cross(n, q)))
-    return MidHorizon(seeds.observer, x, n, seeds.weight, along, across)
+def _mid_nodes(body: Surface, row: int, points: FloatArray, q: FloatArray, weight: FloatArray) -> MidHorizon:
+    """Nodes of one observer at points (n, 3) of its contour."""
+    n, hessian = bending(body, points)
+    along, across = (second_form(v, hessian) for v in (np.broadcast_to(q, n.shape), np.cross(n, q)))
+    return MidHorizon(np.full(len(points), row), points, n, weight, along, across)

@@ -17,6 +17,7 @@ from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.equations import sharpest_curvature
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import M12, WITH_JACOBI, pack
+from creeping.geometry.directions import tangent_frames
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import Surface, normal, size
 from creeping.storage.memory import within_budget
@@ -28,6 +29,8 @@ WIDEST, MOST_RAYS = 0.2, 1536
 TURN = 0.2
 """Largest angle by which a ray turns in one step."""
 RTOL = 1e-9
+"""Relative tolerance of rays. Twice as many rays, half of the gaps and steps, and a tenth of the tolerance find the
+same geodesics (``tests/rays/test_port_rays.py``)."""
 NODE_BYTES = 600.0
 """Of a fan's node: two states with their Jacobi fields, and what is carried."""
 NODES = 400_000
@@ -67,9 +70,9 @@ class PortRays:
         Change of A with the place of each end along b = n x p there, the other end held.
     error : (m,), L
         Of the arclength, by polynomials of lower degree.
-    folds, ended : (n, n), L^(1/3)
-        Least A at which rays merge close to a port, and of rays that pass close to it after kappa_n has fallen to 0,
-        from the lower number; inf where none do.
+    folds, ended : (s, n), L^(1/3)
+        Of the s ports that send fans, the first ones: least A at which rays merge close to a port of higher number, and
+        of rays that pass close to it after kappa_n has fallen to 0; inf where none do.
     """
 
     body: Surface
@@ -97,42 +100,15 @@ class PortRays:
         """Number of geodesics."""
         return len(self.first)
 
-    def among(self, begin: int, end: int) -> "PortRays":
-        """Those between ports of these numbers, which count from 0 then."""
-        ports = slice(begin, end)
-        found = self.chosen((self.first >= begin) & (self.second < end))
-        return replace(
-            found,
-            ports=self.ports[ports],
-            normals=self.normals[ports],
-            first=found.first - begin,
-            second=found.second - begin,
-            folds=self.folds[ports, ports],
-            ended=self.ended[ports, ports],
-        )
-
-    def across(self, count: int) -> "PortRays":
-        """Those from the first so many ports to the others."""
-        found = self.chosen((self.first < count) & (self.second >= count))
-        folds, ended = (np.full_like(whole, np.inf) for whole in (self.folds, self.ended))
-        folds[:count, count:], ended[:count, count:] = self.folds[:count, count:], self.ended[:count, count:]
-        return replace(found, folds=folds, ended=ended)
-
-    def chosen(self, some: BoolArray) -> "PortRays":
-        """Some of the geodesics, between the same ports."""
-        names = ("first", "second", "arclength", "points", "directions", "spreading", "rates", "caustics", "curvature")
-        parts: dict[str, Any] = {
-            name: getattr(self, name)[some] for name in (*names, "torsion", "bend", "integrals", "turning", "error")
-        }
-        return replace(self, **parts)
-
-
-def tangent_frames(normals: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Two unit tangents at each normal, right-handed with it: (n, 3) -> (n, 3), (n, 3)."""
-    least = np.argmin(np.abs(normals), axis=1)
-    one = np.cross(normals, np.eye(3)[least])
-    one /= np.linalg.norm(one, axis=1, keepdims=True)
-    return one, np.cross(normals, one)
+    def between(self, sources: BoolArray, receivers: BoolArray) -> "PortRays":
+        """Those from some of the n ports (n,) to some, whose numbers stay."""
+        some = sources[self.first] & receivers[self.second]
+        ends = "first", "second", "points", "directions", "rates", "curvature", "torsion", "bend", "turning"
+        whole = "arclength", "spreading", "caustics", "integrals", "error"
+        parts: dict[str, Any] = {name: getattr(self, name)[some] for name in (*ends, *whole)}
+        pairs = np.outer(sources, receivers)[: len(self.folds)]
+        folds, ended = (np.where(pairs, least, np.inf) for least in (self.folds, self.ended))
+        return replace(self, folds=folds, ended=ended, **parts)
 
 
 def departures(normals: FloatArray, angles: FloatArray) -> FloatArray:
@@ -174,7 +150,7 @@ def rays_between(
     boxes = _boxes(ports)
     senders = len(ports) if sources is None else sources
     within_budget(24.0 * PER_PAIR * (LANES + START + 3) * len(ports) * senders, f"{len(ports)} ports", "ask for fewer")
-    folds = np.full((2, len(ports), len(ports)), np.inf)
+    folds = np.full((2, senders, len(ports)), np.inf)
     owners, rows, wide = [], [], []
     counts = _ray_counts(body, ports[:senders], normals[:senders], times)
     for rays in np.unique(counts):

@@ -6,18 +6,14 @@ The length "auto" is that at which this has fallen by e^-7.5 on all but the tent
 most four body sizes. It comes of trial rays of its own: it depends on body, incidence and wavenumber alone. A weighted
 body has no field: its rays take the time that 1.5 body sizes take at its median speed.
 
-Also here: rays traced one by one, each with its incidence, start and end.
-
 Sources: [LK59], [AS64, sec. 10.4]; Derivations, F4.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from creeping._typing import Any, BoolArray, FloatArray
+from creeping._typing import FloatArray
 from creeping.errors import InvalidInputError
 from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.direct_flow import DirectFlow
@@ -28,7 +24,6 @@ from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.evaluators import speed_of, speed_values
 from creeping.geometry.memo import memo
 from creeping.geometry.surface import Surface, size
-from creeping.rays.quantities import RayPoints
 from creeping.rays.transport import carried
 from creeping.shadow.attachment import LaunchPoints
 from creeping.shadow.line import ShadowLine
@@ -200,40 +195,3 @@ def _positive(name: str, value: float | str, alternative: str = "") -> float:
         return positive_number(value, name)
     except InvalidInputError as error:
         raise InvalidInputError(f"{name} = {shown(value)} is not a positive finite number{alternative}") from error
-
-
-@dataclass(frozen=True, eq=False)
-class SingleRays:
-    """Rays (n,), each with its incidence.
-
-    Attributes
-    ----------
-    directions : (n, 3)
-    starts : (n, 3), L
-        Launch points.
-    tangents : (n, 3)
-        Of the shadow line there.
-    rays : RayPoints
-        (n,) Where each ends.
-    risen : (n,) of bool
-        Whether n.r > 0 somewhere before, of rays traced for observers r.
-    """
-
-    directions: FloatArray
-    starts: FloatArray
-    tangents: FloatArray
-    rays: RayPoints
-    risen: BoolArray
-
-    def __getitem__(self, index: Any) -> "SingleRays":
-        """Part of the rays."""
-        return SingleRays(
-            self.directions[index], self.starts[index], self.tangents[index], self.rays[index], self.risen[index]
-        )
-
-    @classmethod
-    def joined(cls, parts: Sequence["SingleRays"]) -> "SingleRays":
-        """All parts as one."""
-        names = ("directions", "starts", "tangents", "risen")
-        directions, starts, tangents, risen = (np.concatenate([getattr(p, name) for p in parts]) for name in names)
-        return cls(directions, starts, tangents, RayPoints.joined([part.rays for part in parts]), risen)

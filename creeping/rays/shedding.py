@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
-from creeping.geometry.directions import first_of_equals
+from creeping.geometry.directions import first_of_equals, tangent_frames
 from creeping.geometry.quadrature import SYMMETRIC, nearest_points
 from creeping.geometry.surface import Surface, normal, project, size
 from creeping.rays.quantities import RayPoints
@@ -120,9 +120,7 @@ def shed_on(strips: tuple[Strip, ...], body: Surface, points: FloatArray) -> She
     """Rays that pass through the points (m, 3) on the body."""
     scale = size(body)
     normals = normal(body, points)
-    first = np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)])
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    frames = np.concatenate([points, normals, first, np.cross(normals, first)], axis=1)
+    frames = np.concatenate([points, normals, *tangent_frames(normals)], axis=1)
 
     def functions(some: FloatArray, x: FloatArray, n: FloatArray, b: FloatArray, p: FloatArray) -> _Functions:
         y, outward, e, f = (some[:, 3 * k : 3 * k + 3] for k in range(4))

@@ -20,7 +20,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
-from creeping.geometry.directions import first_of_equals
+from creeping.geometry.curvature import bending
+from creeping.geometry.directions import first_of_equals, tangent_frames
 from creeping.geometry.piecewise import SMOOTH, nearest_crease, pieces_of, tiles_of
 from creeping.geometry.surface import Surface, normal, project, size
 from creeping.geometry.triangulation import Triangulation, triangulate
@@ -107,12 +108,10 @@ def specular_points(
     r = observers[row]
     q = r + incident[row]
     # backscatter has no plane of incidence: any tangent will do
-    spare = np.cross(n, np.eye(3)[np.argmin(np.abs(n), axis=1)])
-    q = np.where(np.linalg.norm(q, axis=1, keepdims=True) > 1e-9, q, spare)
+    q = np.where(np.linalg.norm(q, axis=1, keepdims=True) > 1e-9, q, tangent_frames(n)[0])
     q = q - np.sum(q * n, axis=1, keepdims=True) * n
     q /= np.linalg.norm(q, axis=1, keepdims=True)
-    g = np.linalg.norm(body.gradient(points), axis=1)
-    H = body.hessian(points) / g[:, None, None]
+    _, H = bending(body, points)
     b = np.cross(n, q)
     along, across, mixed = (np.einsum("ni,nij,nj->n", v, H, w) for v, w in ((q, q), (b, b), (q, b)))
     matrix = np.stack([np.stack([along, mixed], axis=-1), np.stack([mixed, across], axis=-1)], axis=-2)
@@ -223,14 +222,12 @@ def _newton(body: Surface, points: FloatArray, wanted: FloatArray, which: IntArr
 
 def _step(body: Surface, points: FloatArray, wanted: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Size of n - h, and the tangential Newton step S dx = h - n."""
-    gradient = body.gradient(points)
-    g = np.linalg.norm(gradient, axis=1)
-    n = gradient / g[:, None]
+    n, hessian = bending(body, points)
     gap = wanted - n
     # S on the tangent plane, without unit, made regular by the identity along n
     length = size(body)
     tangential = np.eye(3) - n[:, :, None] * n[:, None, :]
-    shape = length * tangential @ body.hessian(points) @ tangential / g[:, None, None] + n[:, :, None] * n[:, None, :]
+    shape = length * tangential @ hessian @ tangential + n[:, :, None] * n[:, None, :]
     right = length * (gap - np.sum(gap * n, axis=1, keepdims=True) * n)
     scale = np.sum(shape * shape, axis=(1, 2))
     flat = np.abs(np.linalg.det(shape)) < FLAT * scale
@@ -285,8 +282,7 @@ def stand_clear(body: Any, points: SpecularPoints, wavenumber: float) -> BoolArr
 
 
 def _is_flat(piece: Any, x: FloatArray, scale: float) -> bool:
-    hessian = np.linalg.norm(piece.hessian(x), axis=(1, 2)) / np.linalg.norm(piece.gradient(x), axis=1)
-    return bool(np.max(hessian) * scale < FLAT)
+    return bool(np.max(np.linalg.norm(bending(piece, x)[1], axis=(1, 2))) * scale < FLAT)
 
 
 def some(points: SpecularPoints, rows: BoolArray | IntArray) -> SpecularPoints:

@@ -11,9 +11,11 @@ R is the distance from a point source, inf of a plane wave.
 Sources: Derivations, R4, R12 and R19.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from creeping._typing import FloatArray, IntArray
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.geodesics.equations import sharpest_curvature
 from creeping.geodesics.integrator import trace_states
@@ -24,7 +26,6 @@ from creeping.geometry.piecewise import is_piecewise, piece_ahead, pieces_of
 from creeping.geometry.surface import Surface, size
 from creeping.rays.ends import non_smooth_from
 from creeping.rays.quantities import GAUSS, GUARD, LANES, START_LANES, RayPoints
-from creeping.rays.reach import SingleRays
 from creeping.shadow.moving import moved_onto_lines
 
 TURN = 0.12
@@ -33,6 +34,36 @@ RTOL = 1e-10
 """Relative tolerance of rays on bodies with creases."""
 TOGETHER, TOGETHER_ON_PIECES = 192, 2048
 """Rays traced in one call, and on a body with creases, where a call has more to do beside them."""
+
+
+@dataclass(frozen=True, eq=False)
+class SingleRays:
+    """Rays (n,), each with its incidence.
+
+    Attributes
+    ----------
+    directions : (n, 3)
+    starts : (n, 3), L
+        Launch points.
+    tangents : (n, 3)
+        Of the shadow line there.
+    rays : RayPoints
+        (n,) Where each ends.
+    risen : (n,) of bool
+        Whether n.r > 0 somewhere before, of rays traced for observers r.
+    """
+
+    directions: FloatArray
+    starts: FloatArray
+    tangents: FloatArray
+    rays: RayPoints
+    risen: BoolArray
+
+    def __getitem__(self, index: Any) -> "SingleRays":
+        """Part of the rays."""
+        return SingleRays(
+            self.directions[index], self.starts[index], self.tangents[index], self.rays[index], self.risen[index]
+        )
 
 
 class RayTracer:
@@ -116,7 +147,7 @@ class RayTracer:
         times: FloatArray,
         owner: IntArray | None = None,
         *,
-        long: int = 0,
+        whole: bool = True,
         openings: FloatArray | None = None,
         observers: FloatArray | None = None,
         cross: bool = False,
@@ -130,8 +161,8 @@ class RayTracer:
         times : (n,), L
         owner : (n,), optional
             Ray of each point; each has its own if not given.
-        long : int
-            0 for all quantities; else steps are so many times as long, and integrals along the ray are left out.
+        whole : bool
+            Whether integrals along the ray are wanted.
         openings : (rays,), optional, 1/L
             1/R, of a point source.
         observers : (n, 3), optional
@@ -153,8 +184,7 @@ class RayTracer:
         lanes, first = np.zeros((n, LANES)), np.zeros((n, START_LANES))
         alive, risen = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
         times = np.array(times)
-        whole, step = long == 0, max(1, long) * self.step
-        scale = size(self.body)
+        step, scale = self.step, size(self.body)
         latest, ends_of = np.zeros(rays), np.full(rays, np.inf)
         np.maximum.at(latest, owner, times)
         # those of like length together: all rays of a call are traced to the latest time

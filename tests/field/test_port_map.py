@@ -1,11 +1,10 @@
-"""The field of one source at many points of a body: a row of the coupling, in blocks, with the source among them."""
+"""The field of one source at many points of a body: a row of the coupling, with the source among them."""
 
 import numpy as np
 import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.field.ports import port_map as module
 from creeping.geometry.surface import project
 
 EGG = sc.Ellipsoid(1.2, 1.0, 0.8)
@@ -17,9 +16,7 @@ def points():
     return project(EGG, np.random.default_rng(5).normal(size=(14, 3)))
 
 
-def test_it_is_a_row_of_the_coupling(points, monkeypatch):
-    # in blocks of 5, which share no fan
-    monkeypatch.setattr(module, "BLOCK", 5)
+def test_it_is_a_row_of_the_coupling(points):
     found = cr.port_field(EGG, points[0], points[1:], wavenumber=K)
     whole = cr.coupling(EGG, points, wavenumber=K)
     np.testing.assert_allclose(found.values, whole[0, 1:], rtol=1e-9)

@@ -5,8 +5,8 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
+from creeping.geometry.directions import tangent_frames
 from creeping.geometry.surface import normal
-from creeping.rays.port_rays import tangent_frames
 from tests.reference import stored
 
 BODY, K = sc.Ellipsoid(0.75, 0.9, 1.15), 12.0

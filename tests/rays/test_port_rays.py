@@ -1,11 +1,13 @@
 """Geodesics between ports: great circles, a count by shooting, Clairaut on a spheroid, symmetry of the second order."""
 
 import numpy as np
+import pytest
 import shared_bodies as sc
 
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
 from creeping.geometry.surface import project
+from creeping.rays import port_rays
 from creeping.rays.port_rays import departures, rays_between
 
 
@@ -90,3 +92,19 @@ def test_second_order_is_the_same_from_both_ends():
     one, other = (r.integrals[key][some] for r, key in zip((there, back), keys, strict=True))
     assert np.max(np.abs(one - other), axis=0).max() < 3e-4
     assert np.median(np.abs(one[:, 1])) > 0.01
+
+
+@pytest.mark.parametrize(("name", "factor"), [("RAYS", 2), ("WIDEST", 0.5), ("TURN", 0.5), ("RTOL", 0.1)])
+@pytest.mark.parametrize("body", [sc.Ellipsoid(1.0, 0.8, 0.6), sc.TwistedEllipsoid()], ids=["ellipsoid", "twisted"])
+def test_denser_fans_find_the_same(body, name, factor, monkeypatch):
+    """But next to rays that have ended, of which is told."""
+    ports = spread_ports(body, 12, 5)
+    some = rays_between(body, ports, 2.5)
+    monkeypatch.setattr(port_rays, name, type(getattr(port_rays, name))(factor * getattr(port_rays, name)))
+    other = rays_between(body, ports, 2.5)
+    counts = [np.bincount(rays.first * 12 + rays.second, minlength=144).reshape(12, 12) for rays in (some, other)]
+    assert np.all((counts[0] == counts[1]) | np.isfinite(some.ended))
+    if len(some) == len(other):
+        assert np.max(np.abs(some.arclength - other.arclength)) < 1e-5
+        assert np.max(np.abs(some.spreading - other.spreading)) < 1e-5
+        assert np.max(np.abs(some.integrals[:, 0] - other.integrals[:, 0])) < 1e-4

@@ -8,7 +8,7 @@ from tolerances import ALONG_RAY
 
 import creeping as cr
 from creeping.geometry.curvature import gaussian_curvature, normal_curvature
-from creeping.rays.fan_points import ray_points as points_of
+from creeping.rays.strips import ray_points as points_of
 from creeping.rays.tracer import RayTracer
 
 INCIDENCE = (0.3, 0.5, 0.81)

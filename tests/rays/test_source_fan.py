@@ -8,7 +8,7 @@ import creeping as cr
 from creeping.files import write_mat
 from creeping.geometry.surface import normal
 from creeping.plotting._drawing import compose
-from creeping.rays.fan_points import ray_points
+from creeping.rays.strips import ray_points
 from creeping.shadow.attachment import line_tangents
 
 SOURCE = np.array([-0.9, 0.7, 0.4])

@@ -13,7 +13,7 @@ from creeping.geodesics.integrator import trace_states
 from creeping.geometry.surface import normal, project, size
 from creeping.rays import tracer
 from creeping.rays.ends import NON_SMOOTH_SPACING
-from creeping.rays.fan_points import ray_points
+from creeping.rays.strips import ray_points
 from creeping.rays.uncertain_body import body_uncertainty
 
 EXACT = sc.Ellipsoid(1.0, 0.8, 0.6)

@@ -29,13 +29,14 @@ from creeping.field.currents.lit import lit_currents
 from creeping.field.marching.fan_waves import fan_waves, march_alone, marchable, spread_out
 from creeping.field.waves.shed_wave import smoothstep
 from creeping.field.waves.surface import surface_waves
+from creeping.geometry.directions import tangent_frames
 from creeping.geometry.piecewise import is_piecewise, piece_ahead, pieces_of
 from creeping.geometry.quadrature import BodyNodes, body_nodes, nearest_points, nodes_at
 from creeping.geometry.surface import Surface, normal, size
 from creeping.rays.fan import RayFan, launch
-from creeping.rays.fan_points import ray_points
 from creeping.rays.quantities import SHARPEST, STEEPEST, RayPoints
 from creeping.rays.reach import ray_length
+from creeping.rays.strips import ray_points
 from creeping.shadow.attachment import occluded
 from creeping.shadow.line import ShadowLine
 from creeping.shadow.status import ATTACHED
@@ -132,9 +133,7 @@ def axes_of_incidence(normals: FloatArray, direction: FloatArray) -> FloatArray:
     along = direction - (normals @ direction)[:, None] * normals
     length = np.linalg.norm(along, axis=1, keepdims=True)
     # at normal incidence any plane will do: kappa_a/c^2 + kappa_b is the sum of both there
-    spare = np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)])
-    spare /= np.linalg.norm(spare, axis=1, keepdims=True)
-    return np.where(length > 1e-6, along / np.maximum(length, 1e-300), spare)
+    return np.where(length > 1e-6, along / np.maximum(length, 1e-300), tangent_frames(normals)[0])
 
 
 def lit_nodes(body: Surface, line: ShadowLine, wavenumber: float) -> LitNodes:

@@ -28,8 +28,9 @@ from creeping.field.boundary import Boundary
 from creeping.field.marching.fan_rays import FLAT, fan_profiles, wide_rows
 from creeping.field.marching.layer import MarchedRays, march_rays
 from creeping.field.marching.plan import MarchStatus
-from creeping.field.waves.beams import MOST_TURNED, STRONG, beams_beside_rays, blended_sum, variation
+from creeping.field.waves.beams import STRONG, beams_beside_rays, blended_sum, variation
 from creeping.field.waves.far_geometry import fan_strips
+from creeping.field.waves.gaussian_beams import MOST_TURNED
 from creeping.field.waves.ray_sums import RaySum
 from creeping.field.waves.strip_waves import StripTable, around, modes_on_strip
 from creeping.geometry.piecewise import has_edges, is_piecewise

@@ -1,39 +1,35 @@
-"""The wave between ports where geodesics merge: Gaussian beams along all of them from one port, on caustics finite.
+"""The field of one port where geodesics merge: Gaussian beams along all rays from it, finite on caustics.
 
-    u(x) = Σ dθ (k_c ε/2π)^(1/2) q^(-1/2) y e^{iks + (i/2) k_c (q'/q) n²},   q = J2 - iε J1,   k_c = k - i y_s/y
+    u(x) = sum of `creeping.field.waves.gaussian_beams` from the port, S = s, dsigma its angle
 
-y is the wave of `creeping.field.ports.waves` without its J2, (s, n) the foot of x on the ray of angle θ and its
-distance from there. arg q runs on from -π/2. By stationary phase each geodesic through x has its own wave again, and
-the term g² of its second order: it is left out of y. ε = WIDTH a, a length, is free; what it changes tells the error.
+y is the wave of `creeping.field.ports.tensor` without what J2 does to it; the term g^2 of its second order, and for
+slots those in J2'/J2, 1/J2 and K0, come back by stationary phase and are left out. A tensor's y is that of V, with the
+components carried by their ratio to it. A beam of H = A b + B p turns with its front off its ray, to b - (q'/q) n p and
+p + (q'/q) n b; the normal does not turn.
 
-Sources: [P82], [CPP82]; Derivations, F24 and F25.
+Sources: [P82], [CPP82]; Derivations, F24, F25, F28 and F34.
 """
 
 import numpy as np
 
-from creeping._typing import Any, ComplexArray, FloatArray, IntArray
-from creeping.field.ports.waves import PathTerms
+from creeping._typing import ComplexArray, FloatArray, IntArray
+from creeping.field.ports.path_waves import PathWaves
+from creeping.field.ports.waves import Path
+from creeping.field.waves.gaussian_beams import WIDTH, GaussianBeams, beam_length, turned_by
 from creeping.geodesics.equations import sharpest_curvature
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import Surface, normal, size
 from creeping.rays.port_rays import TURN, traced_fans
 
-WIDTH, OTHER = 2.5, 0.6
-"""ε/a, and the factor of the other ε."""
+OTHER = 0.6
+"""Factor of the other eps, by which beams are judged: as free as eps (F24)."""
 APART, STEP = 0.22, 0.08
-"""Angle between beams, in (ka)^(-1/2), and steps, in a/(ka)^(1/3)."""
+"""Angle between beams, in (ka)^(-1/2), and steps, in a/(ka)^(1/3): half of both changes less than 0.1 of the stated
+error (``tests/field/test_port_beams.py``)."""
 FEWEST = 128
-REACH = 0.9
-"""How far a beam reaches, in terms of a."""
-EVERY, NOTHING = 4, -690.0
-"""Steps between those at which waves are found, and the logarithm of none."""
-MOST_TURNED = 0.5
-"""Bound of |k_c/k - 1|."""
-
-
-def beam_length(body: Surface) -> float:
-    """A, L: the radius of a ball of the body's size."""
-    return float(size(body) / np.sqrt(3))
+"""Beams of a port, at least: as APART asks for at ka = 20."""
+EVERY = 4
+"""Steps between those at which waves are found, with cubics between: half of it changes 6e-4 at most."""
 
 
 def beam_width(body: Surface, wavenumber: float) -> float:
@@ -42,110 +38,97 @@ def beam_width(body: Surface, wavenumber: float) -> float:
 
 
 class PortBeams:
-    """Beams of one port at one wavenumber.
+    """Beams of one port, of number ``number``, by whose tensor and along whose axis its waves are."""
 
-    Parameters
-    ----------
-    body : Surface
-    port, outward : (3,), L and 1
-        And its normal.
-    length : float, L
-    wavenumber : float, 1/L
-    order : int
-    """
-
-    def __init__(
-        self, body: Surface, port: FloatArray, outward: FloatArray, length: float, wavenumber: float, order: int
-    ) -> None:
-        from creeping.field.kernels.ray_profile import SPAN, spans_of
+    def __init__(self, waves: PathWaves, number: int) -> None:
         from creeping.rays.kernels import port_fans as lane
 
-        self.k, self.a = wavenumber, beam_length(body)
-        rays = 2 * max(FEWEST // 2, int(np.ceil(np.pi / APART * self.a / beam_width(body, wavenumber))))
-        steps = int(np.ceil(length / self.a * max(np.cbrt(wavenumber * self.a) / STEP, self._turns(body) / TURN)))
+        body, k, port, n = waves.rays.body, waves.wavenumber, waves.rays.ports[number], waves.rays.normals[number]
+        self.waves, a, length = waves, beam_length(body), waves.rays.length
+        count = 2 * max(FEWEST // 2, int(np.ceil(np.pi / APART * a / beam_width(body, k))))
+        steps = int(np.ceil(length / a * max(np.cbrt(k * a) / STEP, a * sharpest_curvature(body) / TURN)))
         self.step = length / steps
         times = self.step * np.arange(steps + lane.GUARD + 1, dtype=float)
-        states = traced_fans(body, port[None], outward[None], rays, times)[0]
-        lanes = np.zeros((rays, len(times) - 4 + lane.BEHIND, lane.LANES))
-        last = np.zeros(rays, dtype=np.int64)
+        states = traced_fans(body, port[None], n[None], count, times)[0]
+        lanes = np.zeros((count, len(times) - 4 + lane.BEHIND, lane.LANES))
+        last = np.zeros(count, dtype=np.int64)
         with evaluators(body) as parts:
             lane.port_fan(parts.level, parts.level_parameters, self.step, size(body), 0.0, states, lanes, last)
         lanes = lanes[:, lane.BEHIND :]
-        count = lanes.shape[1]
-        S = np.broadcast_to(self.step * np.arange(count), (rays, count))
-        logarithm, slope = self._waves(lanes, S, last, order)
-        turned = -1j * slope / self.k
-        turned /= np.maximum(1.0, np.abs(turned) / MOST_TURNED)
-        self.turned = 1 + turned
-        ended = np.arange(count) > last[:, None]
-        self.size = np.where(ended, NOTHING, logarithm.real) + 0.5 * np.log(np.abs(self.turned))
-        self.phase = logarithm.imag + 0.5 * np.angle(self.turned)
-        x, p = (np.ascontiguousarray(lanes[..., part]) for part in (slice(0, 3), slice(3, 6)))
-        flat = x.reshape(-1, 3)
-        b = np.cross(normal(body, flat), p.reshape(-1, 3))
-        self.rays = (x, p, b.reshape(x.shape), np.ascontiguousarray(lanes[..., lane.ACROSS]), np.ascontiguousarray(S))
-        self.states, self.apart = states[:, :count], 2 * np.pi / rays
-        spans = -(-(count - 1) // SPAN)
-        self.balls = np.empty((rays, spans, 3)), np.empty((rays, spans))
-        spans_of(x, *self.balls)
-        # what is carried along, and what beams off their rays add to it
-        self.carried = np.ones((1, 1, 1), dtype=complex)
-        self.leaning = np.zeros((1, 1, 1), dtype=complex)
+        shape = lanes.shape[:2]
+        logarithm, slope, ratio = self._waves(lanes, last)
+        # behind the end of its ray a beam is nothing
+        ended = np.arange(shape[1]) > last[:, None]
+        logarithm = np.where(ended, -690.0 + 1j * logarithm.imag, logarithm)
+        x, p = lanes[..., 0:3], lanes[..., 3:6]
+        b = np.cross(normal(body, x.reshape(-1, 3)), p.reshape(-1, 3)).reshape(x.shape)
+        S = np.broadcast_to(self.step * np.arange(shape[1]), shape)
+        curvature, apart = lanes[..., lane.ACROSS], 2 * np.pi / count
+        self.beams = GaussianBeams(body, k, states[:, : shape[1]], b, curvature, S, logarithm, slope, apart)
+        if ratio is not None:
+            self._carry(ratio, b, p, turned_by(slope, k), waves.axes[number])
 
-    def _turns(self, body: Surface) -> float:
-        """Largest angle, radians, by which a ray turns along a length a."""
-        return self.a * sharpest_curvature(body)
+    def _waves(self, lanes: FloatArray, last: IntArray) -> tuple[ComplexArray, ComplexArray, ComplexArray | None]:
+        """Logarithm of y, in 1/L^(1/2), along all rays, y_s/y, 1/L, and the ratio of a tensor's components to it.
 
-    def _waves(self, lanes: FloatArray, S: FloatArray, last: IntArray, order: int) -> tuple[ComplexArray, ComplexArray]:
-        """Logarithm of y, in 1/L^(1/2), along all rays and its slope, 1/L: (rays, steps), (rays, steps).
-
-        By cubic splines of log y √s through every EVERY-th step; behind the end of a ray they stay.
+        (rays, steps) both, and (rays, steps, fields, moments), by cubic splines of log y √s through every EVERY-th
+        step; behind the end of a ray they stay.
         """
         from scipy.interpolate import CubicSpline
 
         from creeping.rays.kernels import port_fans as lane
 
-        count = S.shape[1]
+        count = lanes.shape[1]
         steps = np.append(np.arange(1, count - 1, EVERY), count - 1)
         # rays of kappa_n <= 0 at their ports have no wave at all
-        known = np.take_along_axis(lanes, np.clip(steps, 1, np.maximum(last, 1)[:, None])[..., None], axis=1)
+        at = np.clip(steps, 1, np.maximum(last, 1)[:, None])
+        known = np.take_along_axis(lanes, at[..., None], axis=1)
         known = np.where((last > 0)[:, None, None], known, 1.0)
-        s = self.step * np.clip(steps, 1, np.maximum(last, 1)[:, None]).ravel()
+        s = self.step * at.ravel()
 
         def ends(of: int) -> FloatArray:
             start = np.broadcast_to(lanes[:, :1, of], known.shape[:2])
             return np.stack([start.ravel(), known[..., of].ravel()], axis=1)
 
-        curvature = np.abs(ends(lane.CURVATURE))
         integrals = known[..., lane.INTEGRALS : lane.INTEGRALS + lane.PARTS].reshape(-1, lane.PARTS)
-        y = self._wave((self.k, s, curvature, ends(lane.TORSION), ends(lane.BEND), integrals), order)
-        y = (np.where(np.abs(y) > 0, y, 1e-300) * np.sqrt(s)).reshape(known.shape[:2])
-        smooth = np.log(np.abs(y)) + 1j * np.unwrap(np.angle(y), axis=1)
-        curve = CubicSpline(steps * self.step, smooth, axis=1)
+        curvature, torsion, bend = np.abs(ends(lane.CURVATURE)), ends(lane.TORSION), ends(lane.BEND)
+        path = Path(self.waves.wavenumber, s, curvature, torsion, bend, integrals, np.zeros_like(curvature))
+        tensor, order = self.waves.tensor(path), self.waves.order
+        components, ratio = tensor.carried(order), None
+        # of a scalar its own wave, of a tensor that of V
+        y = components[:, 0, 0] if components.shape[1:] == (1, 1) else tensor.hard.value(order)
         # at the port itself y is infinite; beams begin behind it
-        at = self.step * np.maximum(np.arange(count), 1)
-        self.known, self.at = steps * self.step, at
-        return curve(at) - 0.5 * np.log(at), curve(at, 1) - 0.5 / at
+        inside = self.step * np.maximum(np.arange(count), 1)
+        if components.shape[1:] != (1, 1):
+            with np.errstate(divide="ignore", invalid="ignore"):
+                ratio = components / y[:, None, None]
+            ratio = np.where(np.isfinite(ratio), ratio, 0.0).reshape(*known.shape[:2], *components.shape[1:])
+            ratio = CubicSpline(steps * self.step, ratio, axis=1)(inside)
+        y = tensor.hard.factor * y
+        y = (np.where(np.abs(y) > 0, y, 1e-300) * np.sqrt(s)).reshape(known.shape[:2])
+        curve = CubicSpline(steps * self.step, np.log(np.abs(y)) + 1j * np.unwrap(np.angle(y), axis=1), axis=1)
+        return curve(inside) - 0.5 * np.log(inside), curve(inside, 1) - 0.5 / inside, ratio
 
-    def _wave(self, path: tuple[Any, ...], order: int) -> ComplexArray:
-        """Y of paths (m,), what `PathTerms` asks for."""
-        return PathTerms(*path).wave(order)
+    def _carry(self, ratio: ComplexArray, b: FloatArray, p: FloatArray, turned: ComplexArray, axis: FloatArray) -> None:
+        """Take the components' ratios to y for the port's axis (3,), and how they turn off the ray."""
+        start = np.stack([b[:, 0], p[:, 0]], axis=1) @ axis
+        if ratio.shape[2] == 2:
+            along = np.einsum("rsfg,rg->rsf", ratio, start)
+            side, front = along[..., :1], along[..., 1:]
+            self.beams.carry(side * b + front * p, (front * b - side * p) / (1 + turned)[..., None])
+        else:
+            # of the axis, and of one across it, which tells what is the most that one could give
+            both = np.stack([start, start[:, ::-1] * (1, -1)])
+            carried = np.einsum("rsg,arg->rsa", ratio[:, :, 0], both)
+            self.beams.carry(carried, np.zeros_like(carried))
 
-    def sums(self, points: FloatArray, beyond: float) -> tuple[ComplexArray, ComplexArray]:
-        """Sums at points (n, 3) by feet farther along than ``beyond``, L, for both ε: (n, c), (n, c), 1/L."""
-        from creeping.field.kernels.ray_profile import add_beams
-
-        found = []
-        for factor in (1.0, OTHER):
-            eps = WIDTH * self.a * factor
-            q = self.states[..., 8] - 1j * eps * self.states[..., 6]
-            rate = self.states[..., 9] - 1j * eps * self.states[..., 7]
-            weight = 0.5 * np.log(self.k * eps / (2 * np.pi)) + np.log(self.apart)
-            strength = self.size - 0.5 * np.log(np.abs(q)) + weight
-            phase = self.phase - 0.5 * np.unwrap(np.angle(q), axis=1)
-            early, late = np.zeros((2, len(points), self.carried.shape[2]), dtype=complex)
-            cut = max(2, round(beyond / self.step))
-            table = (*self.rays, strength, phase, rate / q * self.turned, self.k, cut, REACH * self.a, *self.balls)
-            add_beams(points, *table, self.carried, self.leaning, early, late)
-            found.append(late)
-        return found[0], found[1]
+    def sums(self, targets: IntArray, beyond: float) -> tuple[ComplexArray, ComplexArray, FloatArray]:
+        """Fields at ports of numbers (n,) by feet farther along than ``beyond``, L, for both eps, and their bounds."""
+        cut = max(2, round(beyond / self.step))
+        points, eps = self.waves.rays.ports[targets], WIDTH * self.beams.a
+        found, again = (self.beams.sums(points, eps * factor, cut, from_point=True)[1] for factor in (1.0, OTHER))
+        largest = np.linalg.norm(found, axis=1)
+        if found.shape[1] == 3:
+            axes = self.waves.axes[targets]
+            return np.sum(found * axes, axis=1), np.sum(again * axes, axis=1), largest
+        return found[:, 0], again[:, 0], largest

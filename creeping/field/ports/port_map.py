@@ -1,6 +1,6 @@
 """The field of one unit point source on a hard body at many points of the body: a row of the coupling of ports.
 
-    u(x) = sum over geodesics from the source of the waves of `creeping.field.ports.waves`, or beams where these merge
+    u(x) = sum over geodesics from the source, or beams, as in `creeping.field.ports.couplings`
 
 Only the source sends a fan, so that the cost grows with the number of points and not with its square.
 
@@ -18,22 +18,18 @@ import numpy as np
 from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import BoundaryLike, boundary_name
-from creeping.field.ports.coupling_result import CLOSEST, checked_wave, fan_length, merging_pad
-from creeping.field.ports.sources import point_sources
+from creeping.field.ports.couplings import CLOSEST, checked_wave, port_geodesics
+from creeping.field.ports.path_waves import path_waves
 from creeping.field.ports.sums import port_sums
 from creeping.field.results.labelled import power
 from creeping.field.results.point_result import FieldStatus, PointField, point_dataset
 from creeping.geodesics.bundle import as_points, on_body
 from creeping.geometry.checks import unit_of
 from creeping.geometry.surface import Surface, size
-from creeping.rays.port_rays import rays_between
 from creeping.rays.reach import AUTO
 
 if TYPE_CHECKING:
     import xarray
-
-BLOCK = 512
-"""Points of one fan: tables of pairs have the square of it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -118,22 +114,20 @@ def port_field(
     >>> bool(abs(u[0] - cr.coupling(egg, ports, wavenumber=30.0)[0, 1]) < 1e-12)
     True
     """
-    k = checked_wave(body, wavenumber, boundary, order)
+    k = checked_wave(body, wavenumber, order, "ports", boundary)
     start, given = as_points(source), as_points(points)
     if start.shape != (3,):
         raise InvalidInputError(f"source has shape {start.shape}; give one point (3,)")
     x0, x = on_body(body, start[None])[0], on_body(body, given).reshape(-1, 3)
-    far, pad = fan_length(body, k, length), merging_pad(body, k)
     count = len(x)
     values, error = np.full(count, np.inf, dtype=complex), np.full(count, np.inf)
     status, method = np.full(count, int(FieldStatus.CAUSTIC)), np.full(count, "none", dtype="<U5")
-    away = np.flatnonzero(np.linalg.norm(x - x0, axis=1) > CLOSEST * size(body))
-    for first in range(0, len(away), BLOCK):
-        rows = away[first : first + BLOCK]
-        rays = rays_between(body, np.concatenate([x0[None], x[rows]]), far, pad=pad, sources=1)
-        found = port_sums(rays, point_sources(rays, k, order), k)
-        values[rows], error[rows] = found.values[0, 1:], found.error[0, 1:]
-        status[rows], method[rows] = found.status[0, 1:], found.method[0, 1:]
+    away = np.linalg.norm(x - x0, axis=1) > CLOSEST * size(body)
+    if np.any(away):
+        rays = port_geodesics(body, np.concatenate([x0[None], x[away]]), k, length, sources=1)
+        found = port_sums(path_waves(rays, ("point", "point"), rays.normals, k, order))
+        values[away], error[away] = found.values[0, 1:], found.error[0, 1:]
+        status[away], method[away] = found.status[0, 1:], found.method[0, 1:]
     shape = given.shape[:-1]
     return PortField(
         points=given.copy(),

@@ -84,8 +84,26 @@ def judged(
     return np.where((status == FieldStatus.OK) & ~enough, FieldStatus.UNRESOLVED, status).astype(np.int64)
 
 
+class WithStatus:
+    """Base of results whose values have a status of their own each."""
+
+    # no state: results stay frozen dataclasses
+    __slots__ = ()
+    status: IntArray
+
+    @property
+    def ok(self) -> BoolArray:
+        """Where the status is OK (...)."""
+        return np.asarray(self.status == FieldStatus.OK)
+
+    @property
+    def status_counts(self) -> dict[str, int]:
+        """Number of values by name of status; only statuses that occur."""
+        return {s.name: int(np.sum(self.status == s)) for s in FieldStatus if np.any(self.status == s)}
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class PointData(Shown):
+class PointData(Shown, WithStatus):
     """Attributes shared by all fields at points (...); arrays have the shape of the points.
 
     Attributes
@@ -121,16 +139,6 @@ class PointData(Shown):
     order: int
     validity: Validity | None = field(default=None, kw_only=True)
     length_unit: str = field(default="L", kw_only=True)
-
-    @property
-    def ok(self) -> BoolArray:
-        """Where the status is OK (...)."""
-        return np.asarray(self.status == FieldStatus.OK)
-
-    @property
-    def status_counts(self) -> dict[str, int]:
-        """Number of points by name of status; only statuses that occur."""
-        return {s.name: int(np.sum(self.status == s)) for s in FieldStatus if np.any(self.status == s)}
 
     @property
     def unit(self) -> str:

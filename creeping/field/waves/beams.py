@@ -1,18 +1,13 @@
-"""The wave on the body where its rays merge: Gaussian beams along all rays of a fan, on every caustic finite.
+"""The wave on the body where its rays merge: beams along all rays of a fan, and which of rays and beams to take.
 
-    u(x) = sum over rays dsigma_perp (k_c eps/2 pi)^(1/2) q^(-1/2) y e^{ik[d.x0 + s] + (i/2) k_c (q'/q) n^2}
-    q = J + i eps J2,   J2'' + K J2 = 0,   J2(0) = 0,   J2'(0) = 1,   k_c = k - i y_s/y
+    u(x) = sum of `creeping.field.waves.gaussian_beams` from the line, S = d.x0 + s, dsigma across the line
 
-(s, n) are the foot of x on the ray and its distance from there, and arg q runs on from 0, which is the index of the
-caustics. By stationary phase each ray that passes through x has its own wave of `creeping.field.marching.fan_waves`; on
-caustics, folds, cusps and points alike, the sum stays right. k_c, the wavenumber along the surface, is by a factor of
-1 + tau/(2 m^2) more than k for a mode: without it the focus behind a sphere of ka = 30 is off by 6 %, with it by 0.6 %.
+k_c, the wavenumber along the surface, is by a factor of 1 + tau/(2 m^2) more than k for a mode: without it the focus
+behind a sphere of ka = 30 is off by 6 %, with it by 0.6 %. Beams are cut off at the shadow line, so that they serve no
+points within 2 of their widths w = (a/(WIDTH k))^(1/2) of it: there rays have not merged yet, and each that has come
+less far than 4 w stands by itself, others by beams.
 
-eps = WIDTH/a is free; what it changes is an error. Beams are cut off at the shadow line, so that they serve no points
-within 2 of their widths w = (a/(WIDTH k))^(1/2) of it: there rays have not merged yet, and each that has come less far
-than 4 w stands by itself, others by beams.
-
-Also here: rays that pass through points of the body, and beams where those merge: which of the two, and how far off.
+Of the rays through a point and the beams:
 
     u = (u_r e_b^2 + u_b e_r^2)/(e_r^2 + e_b^2)
 
@@ -25,8 +20,7 @@ it is, for rays that merge, e_r as of `creeping.field.waves.ray_sums`; for beams
 with u_b' by beams of another width: eta is what a beam that varies across itself errs by. What u_r and u_b differ by
 beyond 2 e_b is added to e_r: on the dark side of a caustic rays know nothing of it.
 
-Sources: [P82], [CPP82]; Derivations, F24; [P82]; Derivations, F22 and F24. A to C were set on the triaxial and the
-twisted ellipsoid.
+Sources: [P82], [CPP82]; Derivations, F22 and F24. A to C were set on the triaxial and the twisted ellipsoid.
 """
 
 from collections.abc import Callable
@@ -41,6 +35,7 @@ from creeping.field.arguments import fock_parameter
 from creeping.field.boundary import Boundary
 from creeping.field.results.point_result import FieldStatus
 from creeping.field.waves.far_geometry import fan_strips
+from creeping.field.waves.gaussian_beams import SECONDS, WIDTH, GaussianBeams, beam_length, turned_by
 from creeping.field.waves.ray_sums import (
     FADED,
     LOST,
@@ -54,32 +49,25 @@ from creeping.field.waves.ray_sums import (
 from creeping.field.waves.shed_wave import smoothstep
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.pieces import trace_pieces
-from creeping.geodesics.states import M11, M12, M21, M22, P, X, pack
+from creeping.geodesics.states import P, X, pack
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.quadrature import BodyNodes, nodes_at
-from creeping.geometry.surface import normal, project, size
-from creeping.kernels.threads import in_threads
+from creeping.geometry.surface import normal, project
 from creeping.rays.fan import RayFan
 from creeping.rays.shedding import ShedRays
 from creeping.rays.strips import Strip
 
-WIDTH = 2.5
-"""Eps a."""
 DENSE, STEPS = 6.0, 8.0
 """Beams a wavelength along the line, and steps a wavelength along them."""
 FEWEST = 64
 """Beams of a strip, and steps, at least."""
-REACH = 0.9
-"""How far a beam reaches, in terms of a."""
 CUT, YOUNG = 4.0, (2.0, 3.0)
 """Where beams are cut off that of a ray, and up to where rays stand by themselves, in widths w."""
 RTOL = 1e-9
-SECONDS, MAKING = 2e-8, 3e-6
-"""Of a beam's block of steps at one point, and of making one step."""
+MAKING = 3e-6
+"""Seconds of making one step of a beam."""
 AT_ONCE = 200_000
 """Steps of beams that are held at once: 60 MB."""
-MOST_TURNED = 0.5
-"""Bound of |k_c/k - 1|."""
 
 LEAST, VARIES, BROADER = 0.02, 0.5, 1.5
 """A, B and C."""
@@ -124,14 +112,9 @@ class BeamSums:
     late: ComplexArray
 
 
-def length_scale(fan: RayFan) -> float:
-    """A, L: the radius of a ball of the body's size."""
-    return float(size(fan.body) / np.sqrt(3))
-
-
 def width(fan: RayFan, wavenumber: float) -> float:
     """Width w of beams at the shadow line, L."""
-    return float(np.sqrt(length_scale(fan) / (WIDTH * wavenumber)))
+    return float(np.sqrt(beam_length(fan.body) / (WIDTH * wavenumber)))
 
 
 def _counts(strip: Strip, length: float, wavenumber: float) -> tuple[int, int]:
@@ -162,92 +145,63 @@ def beam_sums(
         sigma = low + (high - low) * (np.arange(count) + 0.5) / count
         times = np.linspace(0.0, fan.length, steps + 1)
         some = max(1, AT_ONCE // len(times))
+        cut = int(np.searchsorted(times, CUT * width(fan, waves.wavenumber)))
         for first in range(0, count, some):
-            beams = _Beams(fan, waves, number, sigma[first : first + some], (high - low) / count, times, components)
+            beams = _beams_of(fan, waves, number, sigma[first : first + some], (high - low) / count, times, components)
             for mine, factor in zip(sums, factors, strict=True):
-                mine.append(beams.at(points, WIDTH / beams.a * factor))
+                mine.append(beams.sums(points, WIDTH / beams.a * factor, cut))
     both = [np.sum(mine, axis=0) if mine else np.zeros((2, len(points), 1), dtype=complex) for mine in sums]
     return [BeamSums(*(one[..., 0] if components is None else one)) for one in both]
 
 
-class _Beams:
+def _beams_of(
+    fan: RayFan,
+    waves: StripWaves,
+    number: int,
+    sigma: FloatArray,
+    apart: float,
+    times: FloatArray,
+    components: Components | None,
+) -> GaussianBeams:
     """Beams of places sigma (m,) of a strip, ``apart`` from each other, in steps between ``times`` (steps,)."""
-
-    def __init__(
-        self,
-        fan: RayFan,
-        waves: StripWaves,
-        number: int,
-        sigma: FloatArray,
-        apart: float,
-        times: FloatArray,
-        components: Components | None,
-    ) -> None:
-        from creeping.field.kernels.ray_profile import SPAN, spans_of
-
-        body, count = fan.body, len(sigma)
-        self.k, self.a = waves.wavenumber, length_scale(fan)
-        first = waves.strips[number].at(sigma, np.zeros(count))
-        launched = pack(project(body, first.points), first.directions, jacobi=True)
-        ended = np.zeros((count, len(times)), dtype=bool)
-        if is_piecewise(body):
-            trace = trace_pieces(body, launched, times, rtol=RTOL)
-            self.states, ended = trace.states, trace.end[:, None] <= times
-        else:
-            self.states = trace_states(body, launched, times, rtol=RTOL)
-        x, p = (np.ascontiguousarray(self.states[..., part]) for part in (X, P))
-        flat = x.reshape(-1, 3)
-        nodes = nodes_at(body, flat, normal(body, flat))
-        b = np.cross(nodes.normals, p.reshape(-1, 3))
-        rows, columns = (part.ravel() for part in np.meshgrid(sigma, times, indexing="ij"))
-        y, slope = (part(number, rows, columns).reshape(count, -1) for part in (waves.at, waves.slope))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            turned = np.nan_to_num(-1j * slope / (self.k * y))
-        turned /= np.maximum(1.0, np.abs(turned) / MOST_TURNED)
-        # what varies across beams their sum brings in itself
-        known = (waves.lean(number, rows, columns).reshape(count, -1) * turned) ** 2
-        known = 0.5j * self.k * cumulative_trapezoid(known, times, axis=1, initial=0)
-        self.turned = 1 + turned
-        self.weight = apart * np.abs(first.width)
-        # a ray that has come to a tip ends there
-        strength = np.where(ended, 0.0, np.abs(y))
-        self.size = np.log(np.maximum(strength, 1e-300)) + 0.5 * np.log(np.abs(self.turned)) + known.real
-        self.phase = np.unwrap(np.angle(y), axis=1) + 0.5 * np.angle(self.turned) + known.imag
-        S = first.eikonal[:, None] + times
-        self.rays = (x, p, b.reshape(x.shape), nodes.curvature(b).reshape(S.shape), S)
-        spans = -(-(len(times) - 1) // SPAN)
-        self.balls = np.empty((count, spans, 3)), np.empty((count, spans))
-        spans_of(x, *self.balls)
-        self.cut = int(np.searchsorted(times, CUT * width(fan, self.k)))
-
-        self.V, self.lean = np.ones((1, 1, 1), dtype=complex), np.zeros((1, 1, 1), dtype=complex)
-        if components is not None:
-            found = components(number, rows, columns, nodes, p.reshape(-1, 3))
-            self.V, self.lean = (np.ascontiguousarray(part.reshape(*S.shape, -1), dtype=complex) for part in found)
-
-    def at(self, points: FloatArray, eps: float) -> ComplexArray:
-        """Sums of the beams of ``eps``, 1/L, at points (n, 3), early and late ones: (2, n, c)."""
-        from creeping.field.kernels.ray_profile import add_beams
-
-        q = self.states[..., M11] + 1j * eps * self.states[..., M12]
-        rate = self.states[..., M21] + 1j * eps * self.states[..., M22]
-        weight = np.sqrt(self.k * eps / (2 * np.pi)) * self.weight
-        size = self.size - 0.5 * np.log(np.abs(q)) + np.log(weight)[:, None]
-        phase = self.phase - 0.5 * np.unwrap(np.angle(q), axis=1)
-        table = (*self.rays, size, phase, rate / q * self.turned, self.k, self.cut, REACH * self.a, *self.balls)
-        out = np.zeros((2, len(points), self.V.shape[2]), dtype=complex)
-
-        def work(part: slice) -> None:
-            add_beams(points[part], *table, self.V, self.lean, out[0, part], out[1, part])
-
-        in_threads(work, len(points), least=64, multiple=1, seconds=SECONDS * self.balls[1].size)
-        return out
+    body, count, k = fan.body, len(sigma), waves.wavenumber
+    first = waves.strips[number].at(sigma, np.zeros(count))
+    launched = pack(project(body, first.points), first.directions, jacobi=True)
+    ended = np.zeros((count, len(times)), dtype=bool)
+    if is_piecewise(body):
+        trace = trace_pieces(body, launched, times, rtol=RTOL)
+        states, ended = trace.states, trace.end[:, None] <= times
+    else:
+        states = trace_states(body, launched, times, rtol=RTOL)
+    flat, p = states[..., X].reshape(-1, 3), states[..., P].reshape(-1, 3)
+    nodes = nodes_at(body, flat, normal(body, flat))
+    b = np.cross(nodes.normals, p)
+    rows, columns = (part.ravel() for part in np.meshgrid(sigma, times, indexing="ij"))
+    y, slope = (part(number, rows, columns).reshape(count, -1) for part in (waves.at, waves.slope))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope = slope / y
+    # a ray that has come to a tip ends there
+    strength = np.where(ended, 0.0, np.abs(y))
+    logarithm = np.log(np.maximum(strength, 1e-300)) + 1j * np.unwrap(np.angle(y), axis=1)
+    # what varies across beams their sum brings in itself
+    known = (waves.lean(number, rows, columns).reshape(count, -1) * turned_by(slope, k)) ** 2
+    known = 0.5j * k * cumulative_trapezoid(known, times, axis=1, initial=0)
+    shape, S = (count, len(times)), first.eikonal[:, None] + times
+    bent = nodes.curvature(b).reshape(shape)
+    weight = apart * np.abs(first.width)
+    beams = GaussianBeams(body, k, states, b.reshape(*shape, 3), bent, S, logarithm, slope, weight, known)
+    if components is not None:
+        V, lean = components(number, rows, columns, nodes, p)
+        beams.carry(V.reshape(*shape, -1), lean.reshape(*shape, -1))
+    return beams
 
 
 def variation(fan: RayFan, shed: ShedRays, y: ComplexArray, across: ComplexArray, wavenumber: float) -> FloatArray:
     """Eta (m,) of waves y whose derivative in sigma is ``across`` (m,)."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        eta = np.abs(across / (y * shed.rays.width)) ** 2 * length_scale(fan) / (2 * wavenumber * WIDTH * FACTORS[0])
+        eta = (
+            np.abs(across / (y * shed.rays.width)) ** 2 * beam_length(fan.body) / (2 * wavenumber * WIDTH * FACTORS[0])
+        )
     return np.nan_to_num(eta, nan=0.0, posinf=1.0)
 
 

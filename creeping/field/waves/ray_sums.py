@@ -241,11 +241,17 @@ def merging_error(shed: ShedRays, size: FloatArray, wavenumber: float, count: in
     zeros = rays.caustics + (rays.spreading * (rays.spreading + shed.reach * rays.spreading_rate) < 0)
     by = np.argsort(shed.observer, kind="stable")
     by = by[size[by] > 0]
-    observer, parity, length, size = shed.observer[by], zeros[by] % 2, (rays.eikonal + shed.reach)[by], size[by]
-    out = np.zeros(count)
-    apart = 1
+    length = (rays.eikonal + shed.reach)[by]
+    return merging_of(shed.observer[by], zeros[by], length, size[by], wavenumber, count)
+
+
+def merging_of(
+    observer: IntArray, zeros: IntArray, length: FloatArray, size: FloatArray, wavenumber: float, count: int
+) -> FloatArray:
+    """The same of waves in the order of their observers, with zeros of J passed and lengths of their ways (n,)."""
+    parity, out, apart = zeros % 2, np.zeros(count), 1
     # pairs of one observer stand at most as far apart as it has rays
-    while apart < len(by):
+    while apart < len(observer):
         first = np.flatnonzero(observer[apart:] == observer[:-apart])
         if not len(first):
             break

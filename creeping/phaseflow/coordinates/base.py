@@ -25,6 +25,7 @@ from typing import Protocol
 import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
+from creeping.geometry.directions import tangent_frames
 from creeping.geometry.evaluators import is_compiled
 from creeping.geometry.revolution import charted_axis
 from creeping.geometry.surface import Surface, size
@@ -154,10 +155,9 @@ class MeridianModel(RotationModel):
 
     def at(self, chart: int, u: FloatArray, v: FloatArray, angle: FloatArray) -> FloatArray:
         """See `Model`; v beyond [0, 1] goes on over the pole."""
-        first = np.cross(self.axis, np.eye(3)[np.argmin(np.abs(self.axis))])
-        first /= np.linalg.norm(first)
+        first, second = tangent_frames(self.axis)
         azimuth, theta, angle = (np.asarray(t)[..., None] for t in (2 * np.pi * u, np.pi * np.asarray(v), angle))
-        outwards = np.cos(azimuth) * first + np.sin(azimuth) * np.cross(self.axis, first)
+        outwards = np.cos(azimuth) * first + np.sin(azimuth) * second
         s = np.cos(theta) * self.axis + np.sin(theta) * outwards
         south = np.cos(theta) * outwards - np.sin(theta) * self.axis
         return quaternions(s, np.cos(angle) * south + np.sin(angle) * np.cross(s, south))

@@ -23,7 +23,7 @@ from numba import njit
 
 from creeping.kernels.block import copy
 from creeping.kernels.block import strict_options as options
-from creeping.kernels.exponential import second_form
+from creeping.rays.kernels.quantities import curvatures_along
 
 BEHIND, AHEAD = 2, 3
 """Nodes that polynomials take before and behind an interval."""
@@ -60,23 +60,10 @@ def port_fan(level, level_par, step, scale, squares, states, lanes, last):
     """
     rays, J = states.shape[0], states.shape[1]
     half, count = rays // 2, J - 4
-    x, g = np.empty((3, J)), np.empty((10, J))
+    x, g, normals = np.empty((3, J)), np.empty((10, J)), np.empty((3, J))
     kappa, across, torsion = np.empty((rays, J)), np.empty((rays, J)), np.empty((rays, J))
     for ray in range(rays):
-        for k in range(J):
-            for axis in range(3):
-                x[axis, k] = states[ray, k, axis]
-        level(x, g[0], g[1:4], g[4:], level_par)
-        for k in range(J):
-            px, py, pz = states[ray, k, 3], states[ray, k, 4], states[ray, k, 5]
-            inverse = 1.0 / math.sqrt(g[1, k] ** 2 + g[2, k] ** 2 + g[3, k] ** 2)
-            nx, ny, nz = g[1, k] * inverse, g[2, k] * inverse, g[3, k] * inverse
-            bx, by, bz = ny * pz - nz * py, nz * px - nx * pz, nx * py - ny * px
-            xx, yy, zz, yz, xz, xy = g[4, k], g[5, k], g[6, k], g[7, k], g[8, k], g[9, k]
-            kappa[ray, k] = second_form(px, py, pz, xx, yy, zz, yz, xz, xy) * inverse
-            across[ray, k] = second_form(bx, by, bz, xx, yy, zz, yz, xz, xy) * inverse
-            hx, hy, hz = xx * px + xy * py + xz * pz, xy * px + yy * py + yz * pz, xz * px + yz * py + zz * pz
-            torsion[ray, k] = (hx * bx + hy * by + hz * bz) * inverse
+        curvatures_along(level, level_par, states[ray], x, g, kappa[ray], across[ray], torsion[ray], normals)
     rates = np.empty((7, J))
     leaning, moving = np.empty(J), np.empty(J)
     for ray in range(rays):

@@ -107,6 +107,30 @@ def cross(level, level_par, matrix, states, step, owner, observers, times):
 
 
 @njit(**options)
+def curvatures_along(level, level_par, states, x, g, kappa, across, torsion, normals):
+    """Fill kappa_n, kappa_t and T = b.Hp/|grad F| (K,), and normals (3, K), at states (K, 6 or more) of a ray.
+
+    x (3, K) and g (10, K) are work space.
+    """
+    for k in range(states.shape[0]):
+        for axis in range(3):
+            x[axis, k] = states[k, axis]
+    level(x, g[0], g[1:4], g[4:], level_par)
+    for k in range(states.shape[0]):
+        px, py, pz = states[k, 3], states[k, 4], states[k, 5]
+        gx, gy, gz = g[1, k], g[2, k], g[3, k]
+        inverse = 1.0 / math.sqrt(gx * gx + gy * gy + gz * gz)
+        nx, ny, nz = gx * inverse, gy * inverse, gz * inverse
+        bx, by, bz = ny * pz - nz * py, nz * px - nx * pz, nx * py - ny * px
+        xx, yy, zz, yz, xz, xy = g[4, k], g[5, k], g[6, k], g[7, k], g[8, k], g[9, k]
+        kappa[k] = second_form(px, py, pz, xx, yy, zz, yz, xz, xy) * inverse
+        across[k] = second_form(bx, by, bz, xx, yy, zz, yz, xz, xy) * inverse
+        hx, hy, hz = xx * px + xy * py + xz * pz, xy * px + yy * py + yz * pz, xz * px + yz * py + zz * pz
+        torsion[k] = (hx * bx + hy * by + hz * bz) * inverse
+        normals[0, k], normals[1, k], normals[2, k] = nx, ny, nz
+
+
+@njit(**options)
 def _along(level, level_par, rule, scale, ray, step, known, kappa, across, normals, totals, angles, good, work, joints):
     """Fill what is known along one ray, states (K, 8), at its steps from the launch point to number ``known``.
 
@@ -119,20 +143,7 @@ def _along(level, level_par, rule, scale, ray, step, known, kappa, across, norma
     g, at, parts = work
     principal = at[0]
     x = np.empty((3, K))
-    for k in range(K):
-        for axis in range(3):
-            x[axis, k] = ray[k, axis]
-    level(x, g[0], g[1:4], g[4:], level_par)
-    for k in range(K):
-        px, py, pz = ray[k, 3], ray[k, 4], ray[k, 5]
-        gx, gy, gz = g[1, k], g[2, k], g[3, k]
-        inverse = 1.0 / math.sqrt(gx * gx + gy * gy + gz * gz)
-        nx, ny, nz = gx * inverse, gy * inverse, gz * inverse
-        bx, by, bz = ny * pz - nz * py, nz * px - nx * pz, nx * py - ny * px
-        xx, yy, zz, yz, xz, xy = g[4, k], g[5, k], g[6, k], g[7, k], g[8, k], g[9, k]
-        kappa[k] = second_form(px, py, pz, xx, yy, zz, yz, xz, xy) * inverse
-        across[k] = second_form(bx, by, bz, xx, yy, zz, yz, xz, xy) * inverse
-        normals[0, k], normals[1, k], normals[2, k] = nx, ny, nz
+    curvatures_along(level, level_par, ray, x, g, kappa, across, at[0], normals)
     good[0] = kappa[GUARD] > 0.0
     angles[0] = math.atan2(-scale * ray[GUARD, 7], ray[GUARD, 6])
     for d in range(5):
