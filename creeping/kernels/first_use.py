@@ -57,7 +57,7 @@ class _FirstUse(events.Listener):  # type: ignore[misc]
             self._told = True
         if multiprocessing.parent_process() is not None or AHEAD in sys.modules:
             return
-        logging.getLogger("creeping").warning("creeping: compiling kernels, once for this installation: up to a minute")
+        logging.getLogger("creeping").warning("creeping: compiling kernels, once for this installation: up to half a minute")
         self.begin(module)
 
     def begin(self, first: str) -> None:
