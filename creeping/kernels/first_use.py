@@ -24,6 +24,8 @@ from creeping.kernels.threads import thread_count
 
 AHEAD = "creeping.commands.upkeep"
 """Module that compiles ahead; by name, for it stands above."""
+OF_RAYS = "exponential.*.nbi"
+"""Kernels in the same folder that every trace of rays has."""
 STAMP = "ahead.done"
 """File that says for which sources all has been compiled."""
 PATIENT = 50_000, 50, 100
@@ -38,7 +40,7 @@ class _FirstUse(events.Listener):  # type: ignore[misc]
     """Hears of every compilation, and of those within it; kernels may be compiled in several threads."""
 
     def __init__(self, folder: Path, digest: str) -> None:
-        self._folder, self._digest = folder, digest
+        self.folder, self._digest = folder, digest
         self._lock, self.depth, self._told, self._begun = threading.Lock(), 0, False, False
         self._thresholds = gc.get_threshold()
 
@@ -55,16 +57,18 @@ class _FirstUse(events.Listener):  # type: ignore[misc]
             if self._told or not module.startswith("creeping."):
                 return
             self._told = True
-        if multiprocessing.parent_process() is not None or AHEAD in sys.modules:
+        if multiprocessing.parent_process() is not None:
             return
-        logging.getLogger("creeping").warning("creeping: compiling kernels, once for this installation: up to half a minute")
+        # commands say it themselves
+        if AHEAD not in sys.modules:
+            logging.getLogger("creeping").warning("creeping: compiling kernels, once for this installation: some 20 s")
         self.begin(module)
 
     def begin(self, first: str) -> None:
         """Compile ahead from now on, once."""
-        if not self._begun and may_start(self._folder, self._digest):
+        if not self._begun and may_start(self.folder, self._digest):
             self._begun = True
-            start(first, self._folder, self._digest)
+            start(first, self.folder, self._digest)
 
     def on_end(self, event: Any) -> None:
         """Have the garbage collected as before."""
@@ -82,9 +86,10 @@ def watch(folder: Path, digest: str) -> None:
 
 
 def begin(first: str) -> None:
-    """Compile ahead for who comes to the kernels of the module ``first`` soon."""
+    """Compile ahead for who comes to the kernels of the module ``first`` soon, where those of rays are not yet kept."""
     for listener in _watching:
-        listener.begin(first)
+        if not any(listener.folder.glob(OF_RAYS)):
+            listener.begin(first)
 
 
 def is_compiling() -> bool:

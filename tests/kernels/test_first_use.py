@@ -55,6 +55,23 @@ def test_compilation_is_told_once_and_compiled_ahead(started, caplog, tmp_path):
     assert len(started) == 1 and not caplog.records
 
 
+def test_commands_compile_ahead_and_say_so_themselves(started, caplog, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, first_use.AHEAD, upkeep)
+    first_use._FirstUse(tmp_path, "").on_start(Event("creeping.shadow.kernels.trace"))
+    assert started == ["creeping.shadow.kernels.trace"] and not caplog.records
+
+
+def test_a_run_compiles_ahead_at_once_where_no_kernel_of_rays_is_kept(started, tmp_path, monkeypatch):
+    monkeypatch.setattr(first_use, "_watching", [first_use._FirstUse(tmp_path, "")])
+    first_use.begin("creeping.shadow")
+    first_use.begin("creeping.shadow")
+    assert started == ["creeping.shadow"]
+    (tmp_path / "exponential.second_form-1.nbi").touch()
+    monkeypatch.setattr(first_use, "_watching", [first_use._FirstUse(tmp_path, "")])
+    first_use.begin("creeping.shadow")
+    assert len(started) == 1
+
+
 def test_nothing_is_compiled_ahead_without_need(monkeypatch, tmp_path):
     assert not first_use.may_start(tmp_path, "abc")
     monkeypatch.delitem(sys.modules, "pytest")

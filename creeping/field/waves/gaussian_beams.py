@@ -113,5 +113,6 @@ class GaussianBeams:
 
 def turned_by(slope: ComplexArray, wavenumber: float) -> ComplexArray:
     """Bounded k_c/k - 1 of waves with y_s/y = slope, 1/L."""
-    turned = np.nan_to_num(-1j * slope / wavenumber)
+    # where a wave vanishes its slope is infinite, and tells nothing
+    turned = np.nan_to_num(-1j / wavenumber * np.where(np.isfinite(slope), slope, 0.0))
     return np.asarray(turned / np.maximum(1.0, np.abs(turned) / MOST_TURNED))

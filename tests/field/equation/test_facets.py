@@ -151,7 +151,8 @@ def test_echoes_and_sweeps_of_facets_are_the_solution(tmp_path):
     asked = {"wavenumbers": k, "boundary": "hard", "quantity": "bistatic", "observation": -d, "store": tmp_path / "s"}
     kept = cr.sweep_directions(body, d[:1], **asked)
     assert np.all(np.isfinite(kept.total)) and np.all(np.isnan(kept.creeping))
-    np.testing.assert_allclose(kept.total.values.ravel()[0], ds.total.values.ravel()[0], atol=1e-6)
+    # two angles may be those of a T-matrix, which holds 1e-4
+    np.testing.assert_allclose(kept.total.values.ravel()[0], ds.total.values.ravel()[0], atol=1e-4)
     again = cr.sweep_directions(body, d[:1], **asked, resume=True)
     np.testing.assert_array_equal(kept.total, again.total)
 
