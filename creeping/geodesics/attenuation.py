@@ -32,8 +32,8 @@ FINE_GAUSS, FINE_SEARCH = NODES - 2, 16
 """Gauss points of an interval of a traced ray, and parts of it in which the first zero is looked for."""
 DIP, REFINED = 0.2, 3
 """Least over greatest curvature of an interval below which each of its parts is integrated, at so many Gauss points."""
-TOGETHER = 4096
-"""Most rays at a time."""
+TOGETHER = 512
+"""Most rays at a time: what lies between their knots takes some 20 MB then."""
 WORKSPACE = 2**24
 """Numbers that the states at fine times may take."""
 
@@ -232,11 +232,11 @@ def _bent(body: Surface, states: FloatArray, fine: Sliding) -> FloatArray:
         turning = speed.value(x)[..., None] * turning + np.sum(speed.gradient(x) * along, axis=-1, keepdims=True) * p
     # x, x', x'' at the knots around each interval, by rows
     jets = np.stack([x, along, turning], axis=2)
+    around = jets[:, fine.first[:, None] + np.arange(NEAREST)].reshape(len(states), len(fine.first), 3 * NEAREST, 3)
+    between = np.concatenate([fine.position @ around, fine.velocity @ around], axis=-1)
     bent = np.empty((len(fine.first), NODES, len(states)))
     ends = curvature_values(body, states.reshape(-1, 6)).reshape(states.shape[:2]).T
     bent[:, 0], bent[:, -1] = ends[:-1], ends[1:]
-    for m, first in enumerate(fine.first):
-        around = jets[:, first : first + NEAREST].reshape(len(states), 3 * NEAREST, 3)
-        between = np.concatenate([fine.position[m] @ around, fine.velocity[m] @ around], axis=-1)
-        bent[m, 1:-1] = curvature_values(body, between.reshape(-1, 6)).reshape(len(states), -1).T
+    inside = curvature_values(body, between.reshape(-1, 6)).reshape(between.shape[:3])
+    bent[:, 1:-1] = np.moveaxis(inside, 0, 2)
     return bent

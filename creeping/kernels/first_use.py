@@ -61,7 +61,9 @@ class _FirstUse(events.Listener):  # type: ignore[misc]
             return
         # commands say it themselves
         if AHEAD not in sys.modules:
-            logging.getLogger("creeping").warning("creeping: compiling kernels, once for this installation: some 20 s")
+            logging.getLogger("creeping").warning(
+                "creeping: compiling kernels, once for this installation: half a minute"
+            )
         self.begin(module)
 
     def begin(self, first: str) -> None:

@@ -1,8 +1,9 @@
 """States of shadow lines: arcs between breaks, whether the wave reaches them, and the launch points on them.
 
 The state is constant between breaks, so one point decides an arc: kappa_n(q) <= 0 is concave; the outermost points of
-the line seen along q are lit; of the rest the backward ray says whether the body stands before it. Two more rays of
-the arc must agree. What is done here for one line does not depend on the others.
+the line projected along q are lit; of the rest the backward ray says whether the body stands before it. Two more rays
+of the arc must agree, or the line counts as uncertain. A line is the same to the last bit whatever is computed beside
+it.
 
 Sources: Derivations, R10.
 """
@@ -23,8 +24,11 @@ from creeping.shadow.status import ATTACHED, CONCAVE, OCCLUDED, STATUSES
 
 PROBES = (0.5, 0.2, 0.8)
 """Parts of an arc at which its state is asked for; the first one decides."""
+BESIDE = 2
+"""Nodes from a break within which an outermost node does not say that its arc is lit: of two curves that nearly touch
+in the picture the hidden one may have it (directions within 0.4 degrees of the axis of two congruent lobes)."""
 NEAR = 1e-2
-"""Longest step, in body sizes, that brings an interpolated point onto the line."""
+"""Longest step, in body sizes, that brings an interpolated point onto the line; kept nodes are much closer."""
 
 
 class Arcs(NamedTuple):
@@ -34,7 +38,7 @@ class Arcs(NamedTuple):
     ----------
     curve, state : (a,)
     ends : (a, 2)
-        In nodes of the curve, the second beyond their number where an arc comes round.
+        In nodes of the curve, the second beyond their number where an arc passes the curve's first node.
     """
 
     curve: IntArray
@@ -102,11 +106,12 @@ def _states(
     x = curves.values_at(curves.points, probed, places.ravel())
     there = moved_onto_lines(body, np.repeat(waves, len(PROBES), axis=0), x, reach=NEAR * size(body), steps=1)
     concave = ~(there.curvature[:: len(PROBES)] > 0)
-    # an arc of next to no length at an outermost node may lie on either side of it
+    # next to a break an outermost node may lie on either side of it
     outermost = extreme[curves.line[curve]]
     own = (outermost >= 0) & (curves.own[outermost] == curve[:, None])
     away = (outermost - curves.first[curve][:, None] - ends[:, :1]) % curves.number[curve][:, None]
-    asked = np.flatnonzero(~concave & ~np.any(own & (away < long[:, None]), axis=1))
+    inside = own & (away > BESIDE) & (away < long[:, None] - BESIDE)
+    asked = np.flatnonzero(~concave & ~np.any(inside, axis=1))
     state, agree = np.where(concave, CONCAVE, ATTACHED), np.ones(len(curve), dtype=bool)
     if len(asked):
         probes = there.points.reshape(-1, len(PROBES), 3)[asked]
@@ -122,7 +127,7 @@ def _states(
 
 
 def _merged(curves: Curves, arcs: Arcs) -> Arcs:
-    """Arcs of which no neighbours have one state: a break may change nothing."""
+    """Join neighbouring arcs of one state: a break need not change it."""
     curve, state, ends = arcs
     starts = np.append(True, (curve[1:] != curve[:-1]) | (state[1:] != state[:-1]))
     first = np.flatnonzero(starts)
@@ -136,7 +141,11 @@ def _merged(curves: Curves, arcs: Arcs) -> Arcs:
     ends[opening, 0] = ends[closing, 0] - curves.number[curve[closing]]
     kept = np.ones(len(curve), dtype=bool)
     kept[closing] = False
-    return Arcs(curve[kept], state[kept], ends[kept])
+    curve, state, ends = curve[kept], state[kept], ends[kept]
+    # to the last bit: what is a whole curve is closed
+    whole = np.bincount(curve)[curve] == 1
+    ends[whole] = np.stack([0.0 * curve, curves.number[curve]], axis=1)[whole]
+    return Arcs(curve, state, ends)
 
 
 def _launched(body: Surface, curves: Curves, arcs: Arcs, n_rays: int, every: bool) -> LaunchPoints:

@@ -187,7 +187,7 @@ def line_tangents(body: Surface, points: FloatArray, direction: FloatArray) -> F
 def occluded(body: Surface, points: FloatArray, direction: FloatArray, reach: FloatArray | float = np.inf) -> BoolArray:
     """Whether the backward ray x - t d, 0 < t < reach, enters the body: points (n, 3), d (3,) or (n, 3) -> (n,).
 
-    It leaves a point along the normal's side, or touches there from a convex side.
+    Points lie on the body, where it is lit or touched from outside, or above it.
     """
     hidden = np.zeros(len(points), dtype=bool)
     d, limit = np.broadcast_to(direction, points.shape), np.broadcast_to(reach, len(points))
@@ -197,7 +197,11 @@ def occluded(body: Surface, points: FloatArray, direction: FloatArray, reach: Fl
     # a point on the face of the box, or just beyond it by rounding, has nothing behind
     step = np.minimum(np.maximum(out, 0.5e-3 * np.linalg.norm(high - low)), limit) / SAMPLES
 
-    def run(part: slice) -> None:
+    def run(slice_: slice) -> None:
+        for start in range(slice_.start, slice_.stop, SLICE):
+            some(slice(start, min(start + SLICE, slice_.stop)))
+
+    def some(part: slice) -> None:
         x, back, h = points[part], d[part], step[part, None]
         t = h * np.arange(1, SAMPLES + 2)
         F = np.asarray(body.level((x[:, None] - t[..., None] * back[:, None]).reshape(-1, 3))).reshape(t.shape)

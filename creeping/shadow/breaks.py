@@ -1,9 +1,9 @@
-"""Places where the state of shadow lines may change: cusps and crossings of their pictures seen along q.
+"""Places where the state of shadow lines may change: cusps and crossings of their pictures along q.
 
-Seen along q a line is a plane curve: of a point source by the stereographic projection of the sphere of directions,
-which takes curves that cross to curves that cross and that of a plane wave for its limit. It has a cusp where
-kappa_n(q) = 0, since T is along q there, and visibility changes only at cusps and, where two of its parts cross, on
-the one behind (the larger x.d, or R).
+Projected along the incident direction q a line is a plane curve: of a point source by the stereographic projection of
+the sphere of directions, which takes curves that cross to curves that cross and that of a plane wave for its limit. It
+has a cusp where kappa_n(q) = 0, since T is along q there, and visibility changes only at cusps and, where two of its
+parts cross, on the one behind (the larger x.d, or R).
 
     plane wave      u = e.x,               v = f.x,               depth x.d
     point source    u = e.y/(1 + a.y),     v = f.y/(1 + a.y),     depth R,     y = q/|q|,  dy = w (T - (T.y) y)/|q|
@@ -21,7 +21,7 @@ from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.shadow.curves import Curves
 
 MOST = 64
-"""Crossings of a line from which on two of its curves lie upon each other in the picture: those tell nothing."""
+"""Most crossings of a line. With more, two curves coincide in the picture, and crossings mean nothing."""
 
 
 class Breaks(NamedTuple):
@@ -77,6 +77,7 @@ def _cusps(curves: Curves) -> tuple[IntArray, FloatArray, BoolArray]:
     # the Illinois rule: an end that is kept twice has its value halved
     low, high, last = np.zeros(len(node)), np.ones(len(node)), np.zeros(len(node))
     at_low, at_high, u = a[node], b[node], np.zeros(len(node))
+    u[at_high == 0] = 1.0
     for _ in range(40 if len(node) else 0):
         open_ = (high - low > 1e-13) & (at_low != 0) & (at_high != 0)
         if not open_.any():

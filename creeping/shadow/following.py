@@ -37,8 +37,7 @@ def followed(body: Surface, wave: FloatArray) -> tuple[LineNodes, tuple[PanelCur
     points, spacing = [], []
     for curve in curves:
         shortest = float(np.min(np.diff(curve.breaks)))
-        # a multiple of 8, as the search for crossings goes by boxes of so many
-        count = 8 * int(np.clip(np.ceil(A_PANEL * curve.length / shortest), *NODES) / 8)
+        count = int(np.clip(np.ceil(A_PANEL * curve.length / shortest), *NODES))
         points.append(curve.at(curve.length * np.arange(count) / count))
         spacing.append(curve.length / count)
     x = np.concatenate(points)

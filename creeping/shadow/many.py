@@ -29,7 +29,6 @@ from creeping.shadow.status import FOLLOWED, OK, SINGULAR
 
 LEAST = 8
 """Fewest incidences worth a thread."""
-
 TOGETHER = 64
 """Most incidences at a time."""
 

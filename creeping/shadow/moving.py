@@ -11,7 +11,7 @@ from creeping.geometry.surface import Surface
 from creeping.kernels.threads import in_threads
 
 EACH = 2e-7
-"""Seconds of a point, about."""
+"""Rough time of a point, seconds: it sizes the slices."""
 
 
 class Moved(NamedTuple):
@@ -27,7 +27,7 @@ class Moved(NamedTuple):
 
 
 def moved_onto_lines(body: Surface, waves: FloatArray, points: FloatArray, *, reach: float, steps: int) -> Moved:
-    """Points of {F = 0, grad F.q = 0} by Newton steps of least norm, the same in whatever company.
+    """Points of {F = 0, grad F.q = 0} by Newton steps of least norm, the same to the last bit alone or with others.
 
     Parameters
     ----------

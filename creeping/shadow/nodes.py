@@ -24,7 +24,7 @@ from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, OK, SINGULAR
 NEAR = 1e-3
 """Longest step, in body sizes, that brings an interpolated point onto the line."""
 FORBIDDEN = 1e-6
-"""v below which a line counts as one that crosses itself."""
+"""v of `critical_distances` below which a line counts as one that crosses itself."""
 
 
 def prepared(body: Surface) -> LineMeshes:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from creeping.shadow.arcs import shared_out
-from creeping.shadow.curves import interpolated
+from creeping.shadow.breaks import breaks_of
+from creeping.shadow.curves import Curves, LineNodes, interpolated
 from creeping.shadow.kernels.crossings import crossings
 
 
@@ -75,3 +76,15 @@ def test_a_place_between_nodes_is_that_of_the_polynomial_and_alone_or_not(rng):
     at = 2 * np.pi * places / 48
     np.testing.assert_allclose(found, np.stack([np.cos(at), np.sin(3 * at)], axis=1), atol=3e-6)
     np.testing.assert_array_equal(found[17:18], interpolated(rows, 0, 48, places[17:18]))
+
+
+def test_a_cusp_at_a_node_is_there():
+    n = 64
+    turn = 2 * np.pi * np.arange(n) / n
+    circle = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    tangents = np.stack([-np.sin(turn), np.cos(turn), 0 * turn], axis=1)
+    kappa = np.cos(turn)
+    kappa[[16, 48]] = 0.0
+    nodes = LineNodes(circle, tangents, kappa, np.array([0, n]), np.array([2 * np.pi / n]), 0.0)
+    found = breaks_of(Curves.of(np.array([[0.0, 0.0, 1.0, 0.0]]), [nodes]), np.array([[-1.0] * 3, [1.0] * 3]))
+    np.testing.assert_allclose(found.place, [16, 48], atol=1e-9)

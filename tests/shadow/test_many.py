@@ -81,6 +81,22 @@ def test_rays_start_on_the_attached_line(rng):
     assert np.all(lines.launch.curve_index[:, 0] == 0)
 
 
+@pytest.mark.parametrize("tilt", [1e-4, 1e-3, 5e-3])
+def test_lobes_behind_each_other_hide_what_they_hide(tilt):
+    # next to the axis of two congruent lobes the pictures of their curves nearly touch
+    body, d = BODIES["peanut"](), unit([1, tilt, 0])
+    line, away = cr.shadow_line(body, d), np.linspace(1e-3, 4, 4000)[:, None]
+    hidden = []
+    for curve in line.curves:
+        convex = curve.curvature > 0
+        blocked = [np.any(body.level(x - away * d) < -1e-9) for x in curve.points]
+        hidden.append(np.mean(convex & blocked) * curve.length)
+    assert line.fractions["occluded"] == pytest.approx(sum(hidden) / line.length, abs=5e-3)
+    assert line.fractions["occluded"] > 0.15
+    found = shadow_lines(body, d[None], 40)
+    assert found.occluded[0] == pytest.approx(line.fractions["occluded"], abs=1e-12)
+
+
 def test_singular_incidences_are_refused_and_those_near_reported():
     body = BODIES["torus"]()
     near = [unit([1, 0, v]) for v in (1e-8, 1e-5, 1e-3, 0.3)]

@@ -1,1 +1,1 @@
-"""Compiled steps of a shadow line, from a mesh to the arcs that launch rays."""
+"""Compiled parts of shadow lines: nodes on a mesh, steps onto the line, crossings of pictures."""

@@ -6,8 +6,8 @@ onto the line; between neighbours x_0, x_1 with chord c and tangents T the curve
 |c| (1 + |T_1 - T_0|^2/24), and equally spaced points of the cubics are brought onto the line again.
 
 Between those the arclength is h = |c|/|A|, A = sum_j a_j (T_-j + T_(1+j)) the mean of the polynomial through the
-tangents around; its order is the number of them. Twelve give the length, and how far eight are off is the estimate of
-its error; how far four are off six, [13 (T_0 + T_1) - (T_-1 + T_2)]/24, says whether the line is resolved.
+tangents around; its order is the number of them. Order 12 gives the length, its difference from order 8 the estimate
+of its error; that of order 4, [13 (T_0 + T_1) - (T_-1 + T_2)]/24, from 6 says whether the line is resolved.
 
 Sources: Derivations, R6, R7, R8 and R19.
 """
@@ -35,9 +35,10 @@ COARSE_STEP = 0.22
 REACH, MORE = 0.5, 4
 """Longest step of a node, in edges: next to a small loop a longer one would end on another branch. And steps more that
 a flagged line takes."""
-LOST, UNSETTLED, SETTLED, PRECISE = 1e-3, 1e-6, 2e-6, 1e-7
-"""Second step of the nodes, in body sizes, that gives a line up, and that sends it to the next mesh; relative error of
-its length by orders 4 and 8 that does."""
+LOST, UNSETTLED = 1e-3, 1e-6
+"""Second step of the nodes, in extents, at which a line is given up, and at which it goes to the next mesh."""
+SETTLED, PRECISE = 2e-6, 1e-7
+"""Relative difference of its length by orders 4 and 6, and by 8 and 12, at which a line goes to the next mesh."""
 
 _AROUND = 6
 _TWELVE = np.array([548839986, -91373082, 27022635, -6409423, 995469, -73985]) / 958003200
@@ -55,7 +56,7 @@ def lines_on_mesh(level, level_par, extent, mesh, waves, x, tangents, curvature,
     level, level_par
         The body's block evaluator.
     extent : float, L
-        Size of the body.
+        Longest side of the body's box.
     mesh : (vertices (3, n), normals (3, n), triangles (m, 3), neighbours (m, 3), edge, turn, nodes)
         ``nodes`` is the number for a line.
     x, tangents : (n, cap, 3), curvature : (n, cap), filled
@@ -152,7 +153,7 @@ def _square(x, i, j):
 
 @njit(**options)
 def _lengths(x, tangents, first, curves, h, lengths):
-    """Lengths h of the cubics, and of the curves; returns whether a chord leans too far from T, and the sum."""
+    """Lengths h of the cubics, and of the curves; returns whether a chord makes over 60 degrees with T, and the sum."""
     leans, whole = False, 0.0
     for c in range(curves):
         lengths[c] = 0.0
