@@ -29,7 +29,7 @@ from creeping.errors import ToleranceError
 from creeping.geodesics.attenuation import halves, kernel_rules
 from creeping.geodesics.states import ATTENUATION, DETACHMENT, WHOLE, pack
 from creeping.geometry.surface import Surface, size
-from creeping.kernels.threads import CHUNK, in_slices, in_threads, pause
+from creeping.kernels.threads import in_slices, in_threads, pause
 from creeping.phaseflow.splines import Grid, Leap, interpolation_operator
 
 REACH = float(np.sqrt(2) - 1)
@@ -79,13 +79,20 @@ class CompiledModel:
         return self._forward.function, self._forward.parameters
 
     @property
-    def _back(self) -> tuple[Any, FloatArray]:
-        return self._inverse.function, self._inverse.parameters
+    def _both(self) -> tuple[Any, ...]:
+        return *self._there, self._inverse.function, self._inverse.parameters
 
-    @cached_property
-    def _surface_table(self) -> FloatArray:
-        """Table of x(u, v) for the kernels, none if psi itself is to be used."""
-        return np.zeros((0, 1, 1, 4))
+    def _to_model(self, states: FloatArray, rays: FloatArray) -> None:
+        """Put coordinates of states (n, 6 or more) into rays[:, :4]."""
+        raise NotImplementedError
+
+    def _to_body(self, rows: FloatArray) -> None:
+        """Replace coordinates rows[:, :4] by states rows[:, :6]."""
+        raise NotImplementedError
+
+    def _between(self, earlier: FloatArray, later: FloatArray, known: FloatArray | None) -> tuple[FloatArray, float]:
+        """Displacement (n, 4) from coordinates to later ones (n, 4), next to the one ``known``, and how sure it is."""
+        raise NotImplementedError
 
     def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
         """Scale and shift from the coordinates of ``locate`` to those of the grid."""
@@ -97,11 +104,9 @@ class CompiledModel:
 
     def states(self, coordinates: FloatArray) -> FloatArray:
         """See `Model`."""
-        from creeping.phaseflow.kernels.nodes import to_body
-
         out = np.empty((len(coordinates), 6))
-        parts = self.kind, self._surface_table, *self._there
-        in_slices(lambda part: to_body(*parts, coordinates[part], out[part]), len(coordinates))
+        out[:, :4] = coordinates
+        in_slices(lambda part: self._to_body(out[part]), len(coordinates))
         return out
 
     def displacement(self, nodes: FloatArray, traced: FloatArray, times: FloatArray) -> FloatArray:
@@ -112,48 +117,48 @@ class CompiledModel:
         ToleranceError
             If the states are too far apart in time to follow.
         """
-        from creeping.phaseflow.kernels.nodes import displacements
-
-        out, sure, traced = np.empty((len(nodes), 4)), [1.0], np.ascontiguousarray(traced)
-        parts = self.kind, self._surface_table, *self._there, *self._back
-
-        def run(part: slice) -> None:
-            sure.append(displacements(*parts, nodes[part], traced[part], out[part]))
-
-        in_slices(run, len(nodes), seconds=1e-6 * traced.shape[1])
-        # a cosine that is not a number must not get lost
-        surest = float(np.min(sure))
-        if not surest >= SUREST:
+        n, steps, _ = traced.shape
+        rays = np.empty((n * steps, 4))
+        states = np.ascontiguousarray(traced).reshape(n * steps, -1)
+        in_slices(lambda part: self._to_model(states[part], rays[part]), n * steps)
+        found, sure = self._between(nodes, rays[::steps], None)
+        for step in range(1, steps):
+            found, its = self._between(nodes, rays[step::steps], found)
+            # a cosine that is not a number must not get lost
+            sure = float(np.min([sure, its]))
+        if not sure >= SUREST:
             raise ToleranceError(
-                f"displacements over {times[-1] / len(times):.3g} are too long to follow (cosine {surest:.2f}); "
+                f"displacements over {times[-1] / len(times):.3g} are too long to follow (cosine {sure:.2f}); "
                 "give a shorter horizon"
             )
-        return out
+        return found
 
     def flow(self, grid: Grid, leap: Leap, states: FloatArray, counts: IntArray) -> FloatArray:
         """See `Model`."""
         from creeping.kernels.block import aligned
-        from creeping.phaseflow.kernels.composition import KEPT, flow
+        from creeping.phaseflow.kernels.composition import flow
         from creeping.phaseflow.kernels.nodes import flow_ordered
 
         out = np.empty((len(states), len(counts), states.shape[1]))
         states = np.ascontiguousarray(states, dtype=float)
         counts = np.asarray(counts, dtype=np.int64)
-        tables = _tables(leap), leap.time, kernel_rules(), grid.degree, *self.placement(grid)
+        parts = self.kind, _tables(leap), leap.time, kernel_rules(), grid.degree, *self.placement(grid)
         used = leap.state.nbytes if states.shape[1] == 6 else leap.nbytes
         many = len(states) >= ORDERED and used > NEAR and int(counts.sum()) > 0
         kernel = flow_ordered if many else flow
-        parts = self.kind, self._surface_table, *self._there, *self._back, *tables
 
         def run(part: slice) -> None:
-            n, at = part.stop - part.start, np.zeros(5)
-            kept: tuple[Any, ...] = (np.empty((KEPT, CHUNK)),)
+            n, lanes = states[part].shape
+            rays, at = np.empty((n, lanes - 2)), np.zeros(4)
+            beside: tuple[Any, ...] = ()
+            self._to_model(states[part], rays)
+            rays[:, 4:] = states[part, 6:]
             if many:
                 cells = int(np.prod(leap.state.shape[:3]))
-                carried = np.empty((n, states.shape[1] - 6))
-                kept = aligned(n, 8), carried, np.empty(n, np.int32), np.zeros(cells + 1, np.int64)
-            while not kernel(*parts, states[part], counts, BUDGET, at, *kept, out[part]):
+                beside = aligned(n, 8), np.empty((n, lanes - 6)), np.empty(n, np.int32), np.zeros(cells + 1, np.int64)
+            while not kernel(*parts, rays, counts, BUDGET, at, *beside, out[part]):
                 pause()
+            self._to_body(out[part].reshape(-1, lanes))
 
         # shares that are ordered stay small, so that what is known of their rays stays in the cache
         in_threads(run, len(states), most=SHARE if many else None, seconds=None)
@@ -189,7 +194,30 @@ class RotationModel(CompiledModel):
 
     @cached_property
     def _surface_table(self) -> FloatArray:
+        """Table of x(u, v) for the kernels, none if psi itself is to be used."""
         return exit_table(self.body, self)
+
+    def _to_model(self, states: FloatArray, rays: FloatArray) -> None:
+        from creeping.phaseflow.kernels import rotation, surface_table
+
+        if len(self._surface_table):
+            surface_table.to_rotations(self._surface_table, *self._both[2:], states, rays)
+        else:
+            rotation.to_rotations(*self._both, states, rays)
+
+    def _to_body(self, rows: FloatArray) -> None:
+        from creeping.phaseflow.kernels import rotation, surface_table
+
+        if len(self._surface_table):
+            surface_table.from_rotations(self._surface_table, rows)
+        else:
+            rotation.from_rotations(*self._there, rows)
+
+    def _between(self, earlier: FloatArray, later: FloatArray, known: FloatArray | None) -> tuple[FloatArray, float]:
+        # of the two quaternions of a rotation the one next to that known
+        turned = quaternion_product(earlier * np.array([1.0, -1.0, -1.0, -1.0]), later)
+        cosine = turned[:, 0] if known is None else np.sum(turned * known, axis=1)
+        return np.where(cosine < 0, -1.0, 1.0)[:, None] * turned, float(np.min(np.abs(cosine), initial=1.0))
 
     def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
         """See `CompiledModel`."""
@@ -245,6 +273,23 @@ class AngleModel(CompiledModel):
     charts = 1
     periodic = (True, True)
     unit = 2 * np.pi
+
+    def _to_model(self, states: FloatArray, rays: FloatArray) -> None:
+        from creeping.phaseflow.kernels.rotation import to_angles
+
+        to_angles(*self._both, states, rays)
+
+    def _to_body(self, rows: FloatArray) -> None:
+        from creeping.phaseflow.kernels.rotation import from_angles
+
+        from_angles(*self._there, rows)
+
+    def _between(self, earlier: FloatArray, later: FloatArray, known: FloatArray | None) -> tuple[FloatArray, float]:
+        # angles are known up to whole turns
+        before = np.zeros_like(later) if known is None else known
+        step = later - earlier - before
+        step -= np.floor(step + 0.5)
+        return before + step, float(np.min(1.0 - 2.0 * np.abs(step), initial=1.0))
 
     def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
         """See `CompiledModel`."""

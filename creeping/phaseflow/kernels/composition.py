@@ -1,9 +1,10 @@
 """Compiled composition of phase maps in the model coordinates of a body.
 
-Two kinds of coordinates r (4, BLOCK): ROTATION, unit quaternions (`rotation`), and ANGLES, turns (`angles`). A map
-is a table of their displacement; a ray is converted to the model once, is composed there, and is converted back for an
-output. FOLDED are rotations whose table covers the octant s >= 0 only, on bodies with three mirror planes, MERIDIAN
-those of bodies of revolution (`meridian`). The table of a body of revolution has one plane: no axis u.
+Two kinds of coordinates r (4, BLOCK): ROTATION, unit quaternions and ANGLES, turns. A map
+is a table of their displacement: rays are converted to the model once, are composed there, and are converted back for
+their outputs, by kernels of `rotation` and `surface_table`. FOLDED are rotations whose table covers the octant s >= 0
+only, on bodies with three mirror planes, MERIDIAN those of bodies of revolution (`surface_table.locate`). The table of
+a body of revolution has one plane: no axis u.
 
 Also here: what all compositions of maps share: stencil sums for a block of rays in explicit vector code.
 
@@ -19,25 +20,18 @@ from creeping.geodesics.kernels.attenuation import SAMPLES, extend
 from creeping.kernels.block import BLOCK, aligned, entry_options, options, strict_inlined, strict_options
 from creeping.kernels.contraction import contraction
 from creeping.kernels.splines import cells_and_fractions, weights
-from creeping.phaseflow.kernels import rotation as _angles
 from creeping.phaseflow.kernels import rotation as _rotations
 from creeping.phaseflow.kernels import surface_table as _meridian
-from creeping.phaseflow.kernels import surface_table as _surface_table
 
 ROTATION, ANGLES, FOLDED, MERIDIAN = 0, 1, 2, 3
-WORK = 48
+WORK = 9
 """Rows of work space for a block."""
 INTERPOLATED = 6 * BLOCK
 """Rows of four of what a block interpolates: displacements, matrices, curvatures, and packed lanes."""
-KEPT = 10
-"""Rows that a block keeps between two calls: coordinates, Jacobi matrix, attenuation, time of detachment."""
 
-_to_rotation, _to_angles = _rotations.to_coordinates, _angles.angles_to_coordinates
-_from_rotation, _from_angles = _rotations.from_coordinates, _angles.angles_from_coordinates
-_to_rotation_by_table = _surface_table.to_coordinates
-_from_rotation_by_table = _surface_table.from_coordinates
-_locate_rotation, _locate_angles, _locate_meridian = _rotations.locate, _angles.locate_angles, _meridian.locate
-_move_rotation, _move_angles, _unfold = _rotations.move, _angles.move_angles, _rotations.unfold
+_locate_rotation, _locate_angles, _locate_meridian = _rotations.locate, _rotations.locate_angles, _meridian.locate
+_move_rotation, _move_angles, _unfold = _rotations.move, _rotations.move_angles, _rotations.unfold
+_read, _write = _rotations.read_block, _rotations.write_block
 
 _sum_3_4, _sum_5_4 = contraction(3, 4), contraction(5, 4)
 _sum_3_8, _sum_5_8 = contraction(3, 8), contraction(5, 8)
@@ -52,28 +46,6 @@ def move(kind, r, d, centre):
         _move_angles(r, d, centre)
     else:
         _move_rotation(r, d, centre)
-
-
-@njit(**options)
-def to_coordinates(kind, surface_table, there, there_par, back, back_par, x, p, work, r):
-    """Coordinates r (4, BLOCK) of points x and directions p (3, BLOCK)."""
-    if kind == ANGLES:
-        _to_angles(there, there_par, back, back_par, x, p, work, r)
-    elif surface_table.shape[0] > 0:
-        _to_rotation_by_table(surface_table, back, back_par, x, p, work, r)
-    else:
-        _to_rotation(there, there_par, back, back_par, x, p, work, r)
-
-
-@njit(**options)
-def from_coordinates(kind, surface_table, there, there_par, r, work, x, p):
-    """Points x and directions p (3, BLOCK) of coordinates r (4, BLOCK)."""
-    if kind == ANGLES:
-        _from_angles(there, there_par, r, work, x, p)
-    elif surface_table.shape[0] > 0:
-        _from_rotation_by_table(surface_table, r, work, x, p)
-    else:
-        _from_rotation(there, there_par, r, work, x, p)
 
 
 @njit(**options)
@@ -187,62 +159,34 @@ def _carry_jacobi(d, matrix, m):
 
 
 @njit(**entry_options)
-def flow(
-    kind, surface_table, there, there_par, back, back_par, leap, time, rules, degree, scale, shift, states, counts,
-    budget, reached, kept, out
-):  # fmt: skip
-    """Compose the map counts[0], then counts[1], ... times on states (n, 6, 10 or 12) into out (n, m, the same).
+def flow(kind, leap, time, rules, degree, scale, shift, rays, counts, budget, reached, out):
+    """Compose the map counts[0], then counts[1], ... times on rays (n, 4, 8 or 10) into out (n, m, 6, 10 or 12).
+
+    Rays are coordinates r (4,), Jacobi matrix (4,), attenuation and time of detachment; they are used up. Of each
+    output coordinates stand at [:4], the rest from 6 on.
 
     ``leap`` is (table, centre, jacobi, matrix, curvature, flagged), as of `phaseflow.grid.Leap`: table (charts, nu, nv,
     na, 4) holds the displacement less its mean ``centre``, jacobi (..., 4 or 8) the Jacobi matrix less its mean
     ``matrix``, or all three, curvature (..., 8) that of `geodesics.kernels.attenuation`, as are the ``rules``.
-    ``there`` takes the model to the body, ``back`` the body to it; ``surface_table`` (6 or 0, n, n, 4) is a table of
-    x(u, v) that replaces ``there``.
 
     Returns whether all is done. After ``budget`` leaps of a block it is not, and is to be called again with the same
-    arguments: ``reached`` (5,), zeros at first, keeps ray, output and leap, the time, and whether it is on its way;
-    ``kept`` (KEPT, BLOCK) the block's coordinates and what else it carries.
+    arguments: ``reached`` (4,), zeros at first, keeps ray, output and leap, and the time.
     """
-    n, lanes = states.shape
-    x, p, r = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK)
-    # Jacobi matrix, attenuation, time of detachment
-    m, sampled = aligned(6, BLOCK), aligned(SAMPLES, BLOCK)
+    n, extras = rays.shape[0], (rays.shape[1] - 2) // 4
+    r, m, carried = aligned(4, BLOCK), aligned(6, BLOCK), rays.shape[1] - 4
     work, uva, w, d = aligned(WORK, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK), np.zeros((INTERPOLATED, 4))
     place, cell, mine = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
-    a = aligned(2, BLOCK)
-    extras = 0 if lanes == 6 else (1 if lanes == 10 else 2)
-    spent, again = 0, reached[4] > 0.0
+    a, sampled = aligned(2, BLOCK), aligned(SAMPLES, BLOCK)
+    spent, first, done, now = 0, int(reached[1]), int(reached[2]), reached[3]
     for start in range(int(reached[0]), n, BLOCK):
-        count = min(BLOCK, n - start)
-        now, first = 0.0, 0
-        if again:
-            first, now = int(reached[1]), reached[3]
-            # not by slices: what numba says of shapes that differ takes longer to compile than all of this
-            for i in range(BLOCK):
-                for k in range(4):
-                    r[k, i] = kept[k, i]
-                for k in range(6):
-                    m[k, i] = kept[4 + k, i]
-        else:
-            for i in range(BLOCK):
-                source = start + min(i, count - 1)
-                for k in range(3):
-                    x[k, i], p[k, i] = states[source, k], states[source, 3 + k]
-                for k in range(6, lanes):
-                    m[k - 6, i] = states[source, k]
-            to_coordinates(kind, surface_table, there, there_par, back, back_par, x, p, work, r)
+        count = _read(rays, start, 0, r)
+        _read(rays, start, 4, m[:carried])
         for output in range(first, counts.shape[0]):
-            done = 0
-            if again:
-                done, again = int(reached[2]), False
             for number in range(done, counts[output]):
                 if spent >= budget:
-                    reached[0], reached[1], reached[2], reached[3], reached[4] = start, output, number, now, 1.0
-                    for i in range(BLOCK):
-                        for k in range(4):
-                            kept[k, i] = r[k, i]
-                        for k in range(6):
-                            kept[4 + k, i] = m[k, i]
+                    reached[0], reached[1], reached[2], reached[3] = start, output, number, now
+                    _write(r, count, start, 0, rays)
+                    _write(m[:carried], count, start, 4, rays)
                     return False
                 spent += 1
                 place_block(kind, r.reshape(-1), work, leap[0], degree, scale, shift, uva, place, cell)
@@ -251,12 +195,13 @@ def flow(
                     bent = d[2 * BLOCK : 4 * BLOCK].reshape(-1)
                     extend_some(bent, rules, time, now, m, mine, some, a, sampled)
                 now += time
-            from_coordinates(kind, surface_table, there, there_par, r, work, x, p)
+            done = 0
             for i in range(count):
-                for k in range(3):
-                    out[start + i, output, k], out[start + i, output, 3 + k] = x[k, i], p[k, i]
-                for k in range(6, lanes):
-                    out[start + i, output, k] = m[k - 6, i]
+                for k in range(4):
+                    out[start + i, output, k] = r[k, i]
+                for k in range(carried):
+                    out[start + i, output, 6 + k] = m[k, i]
+        first, now = 0, 0.0
     return True
 
 

@@ -20,12 +20,11 @@ from creeping.phaseflow.kernels.composition import (
     INTERPOLATED,
     WORK,
     extend_some,
-    from_coordinates,
     leap_block,
     move,
     place_block,
-    to_coordinates,
 )
+from creeping.phaseflow.kernels.rotation import read_block
 
 
 @njit(**entry_options)
@@ -67,77 +66,18 @@ def double(kind, leap, degree, scale, shift, nodes, displacement, matrices, curv
 
 
 @njit(**entry_options)
-def to_body(kind, surface_table, there, there_par, model, out):
-    """States (n, 6) of model coordinates (n, 4)."""
-    x, p, r, work = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK), aligned(WORK, BLOCK)
-    n = model.shape[0]
-    for start in range(0, n, BLOCK):
-        count = min(BLOCK, n - start)
-        for i in range(BLOCK):
-            for k in range(4):
-                r[k, i] = model[start + min(i, count - 1), k]
-        from_coordinates(kind, surface_table, there, there_par, r, work, x, p)
-        for i in range(count):
-            for k in range(3):
-                out[start + i, k], out[start + i, 3 + k] = x[k, i], p[k, i]
-
-
-@njit(**entry_options)
-def displacements(kind, surface_table, there, there_par, back, back_par, nodes, traced, out):
-    """Displacement (n, 4) from nodes (n, 4) along traced states (n, m, lanes), followed continuously.
-
-    A rotation is that of two quaternions, an angle known up to turns: successive states must be near enough to tell
-    which. Returns the least |cosine| (ROTATION) or 1 - 2 |turns| (ANGLES) between successive displacements.
-    """
-    x, p, r, work = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK), aligned(WORK, BLOCK)
-    n, steps = traced.shape[:2]
-    surest = 1.0
-    for start in range(0, n, BLOCK):
-        count = min(BLOCK, n - start)
-        for m in range(steps):
-            for i in range(BLOCK):
-                source = start + min(i, count - 1)
-                for k in range(3):
-                    x[k, i], p[k, i] = traced[source, m, k], traced[source, m, 3 + k]
-            to_coordinates(kind, surface_table, there, there_par, back, back_par, x, p, work, r)
-            for i in range(count):
-                node, d = nodes[start + i], out[start + i]
-                if kind != ANGLES:
-                    w, a, b, c = node[0], -node[1], -node[2], -node[3]
-                    rw, rx, ry, rz = r[0, i], r[1, i], r[2, i], r[3, i]
-                    qw, qx = w * rw - a * rx - b * ry - c * rz, w * rx + a * rw + b * rz - c * ry
-                    qy, qz = w * ry - a * rz + b * rw + c * rx, w * rz + a * ry - b * rx + c * rw
-                    cosine = qw if m == 0 else qw * d[0] + qx * d[1] + qy * d[2] + qz * d[3]
-                    sign = -1.0 if cosine < 0.0 else 1.0
-                    surest = min(surest, abs(cosine))
-                    d[0], d[1], d[2], d[3] = sign * qw, sign * qx, sign * qy, sign * qz
-                else:
-                    for k in range(3):
-                        before = 0.0 if m == 0 else d[k]
-                        step = r[k, i] - node[k] - before
-                        step -= math.floor(step + 0.5)
-                        surest = min(surest, 1.0 - 2.0 * abs(step))
-                        d[k] = before + step
-                    d[3] = 0.0
-    return surest
-
-
-@njit(**entry_options)
 def flow_ordered(
-    kind, surface_table, there, there_par, back, back_par, leap, time, rules, degree, scale, shift, states, counts,
-    budget, reached, ray, carried, bucket, ends, out
-):  # fmt: skip
+    kind, leap, time, rules, degree, scale, shift, rays, counts, budget, reached, ray, carried, bucket, ends, out
+):
     """Do what `composition.flow` does, for many rays; after a leap of all of them the budget may be spent.
 
     Between two calls ``ray`` (n, 8), rows aligned, ``carried`` (n, lanes - 6), ``bucket`` (n,) and ``ends`` (cells of
     (u, v) + 1,), zeros at first, keep the rays: coordinates, fractions of the cell, number of the stencil's first
     coefficient plus 1/2 where an odd number of mirrors has folded the ray: one cache line.
     """
-    n, lanes = states.shape
-    table, more = leap[0], lanes - 6
-    extras = 0 if lanes == 6 else (1 if lanes == 10 else 2)
-    x, p, r = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK)
-    m, sampled = aligned(6, BLOCK), aligned(SAMPLES, BLOCK)
+    n, more = rays.shape[0], rays.shape[1] - 4
+    table, extras = leap[0], (rays.shape[1] - 2) // 4
+    r, m, sampled = aligned(4, BLOCK), aligned(6, BLOCK), aligned(SAMPLES, BLOCK)
     work, uva, w, d = aligned(WORK, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK), np.zeros((INTERPOLATED, 4))
     place, cell, bent = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
     a = aligned(2, BLOCK)
@@ -145,19 +85,14 @@ def flow_ordered(
     flat, order = ray.reshape(-1), np.empty(n, np.int64)
     # a whole number times the next number above 1/na never falls below the quotient, and division is slow
     inverse = (1.0 + 1e-15) / table.shape[3]
-    spent, again = 0, reached[4] > 0.0
+    spent, again = 0, reached[0] > 0.0
     for start in range(0, 0 if again else n, BLOCK):
-        count = min(BLOCK, n - start)
-        for i in range(BLOCK):
-            source = start + min(i, count - 1)
-            for k in range(3):
-                x[k, i], p[k, i] = states[source, k], states[source, 3 + k]
-        to_coordinates(kind, surface_table, there, there_par, back, back_par, x, p, work, r)
+        count = read_block(rays, start, 0, r)
         place_block(kind, r.reshape(-1), work, table, degree, scale, shift, uva, place, cell)
         for i in range(count):
             order[start + i] = start + i
             for k in range(more):
-                carried[start + i, k] = states[start + i, 6 + k]
+                carried[start + i, k] = rays[start + i, 4 + k]
         _put(flat, order[start : start + count], r, uva, place, work[7], inverse, bucket, ends)
     now = reached[3]
     for output in range(int(reached[1]), counts.shape[0]):
@@ -166,7 +101,7 @@ def flow_ordered(
             done, again = int(reached[2]), False
         for number in range(done, counts[output]):
             if spent >= budget:
-                reached[1], reached[2], reached[3], reached[4] = output, number, now, 1.0
+                reached[0], reached[1], reached[2], reached[3] = 1.0, output, number, now
                 return False
             spent += (n + BLOCK - 1) // BLOCK
             _sort(bucket, ends, order)
@@ -194,17 +129,11 @@ def flow_ordered(
                     for k in range(more):
                         carried[mine[i], k] = m[k, i]
             now += time
-        for start in range(0, n, BLOCK):
-            count = min(BLOCK, n - start)
-            for i in range(BLOCK):
-                for k in range(4):
-                    r[k, i] = ray[start + min(i, count - 1), k]
-            from_coordinates(kind, surface_table, there, there_par, r, work, x, p)
-            for i in range(count):
-                for k in range(3):
-                    out[start + i, output, k], out[start + i, output, 3 + k] = x[k, i], p[k, i]
-                for k in range(more):
-                    out[start + i, output, 6 + k] = carried[start + i, k]
+        for i in range(n):
+            for k in range(4):
+                out[i, output, k] = ray[i, k]
+            for k in range(more):
+                out[i, output, 6 + k] = carried[i, k]
     return True
 
 

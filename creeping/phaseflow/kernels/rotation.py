@@ -21,7 +21,7 @@ import math
 
 from numba import njit
 
-from creeping.kernels.block import BLOCK, options
+from creeping.kernels.block import BLOCK, aligned, entry_options, options
 from creeping.kernels.exponential import cosine_sine, inverse_root, turns
 
 REACH = math.sqrt(2) - 1
@@ -135,57 +135,75 @@ def move(r, d, centre):
 def _shape(derivative, s, q, first, second, root):
     """Columns A = d psi [q, s x q] of a block and the distinct entries of G^(-1/2), rows of the outputs."""
     for i in range(BLOCK):
-        sx, sy, sz = s[i], s[BLOCK + i], s[2 * BLOCK + i]
-        qx, qy, qz = q[i], q[BLOCK + i], q[2 * BLOCK + i]
+        sx, sy, sz, qx, qy, qz = s[0, i], s[1, i], s[2, i], q[0, i], q[1, i], q[2, i]
         bx, by, bz = sy * qz - sz * qy, sz * qx - sx * qz, sx * qy - sy * qx
         g11, g12, g22 = 0.0, 0.0, 0.0
         for row in range(3):
-            jx = derivative[3 * row * BLOCK + i]
-            jy = derivative[(3 * row + 1) * BLOCK + i]
-            jz = derivative[(3 * row + 2) * BLOCK + i]
-            one = jx * qx + jy * qy + jz * qz
-            other = jx * bx + jy * by + jz * bz
-            first[row * BLOCK + i], second[row * BLOCK + i] = one, other
+            jx, jy, jz = derivative[3 * row, i], derivative[3 * row + 1, i], derivative[3 * row + 2, i]
+            one, other = jx * qx + jy * qy + jz * qz, jx * bx + jy * by + jz * bz
+            first[row, i], second[row, i] = one, other
             g11 += one * one
             g12 += one * other
             g22 += other * other
-        root[i], root[BLOCK + i], root[2 * BLOCK + i] = inverse_root(g11, g12, g22)
+        root[0, i], root[1, i], root[2, i] = inverse_root(g11, g12, g22)
 
 
 @njit(**options)
-def to_coordinates(forward, forward_par, inverse, inverse_par, x, p, work, r):
-    """Rotations r (4, BLOCK) of points x and directions p (3, BLOCK)."""
-    s, q = work[0:3], work[3:6]
-    inverse(x, s, inverse_par)
-    forward(s, work[6:9], work[9:18], forward_par)
+def read_block(rows, start, first, out):
+    """Numbers rows[start:, first:] of a block into out (m, BLOCK); the last ray fills what is left of a block."""
+    count = min(BLOCK, rows.shape[0] - start)
     for i in range(BLOCK):
-        # any unit vector across s; the smallest component of s is the safest to cross with
-        sx, sy, sz = s[0, i], s[1, i], s[2, i]
-        if abs(sx) <= abs(sy) and abs(sx) <= abs(sz):
-            ex, ey, ez = 0.0, sz, -sy
-        elif abs(sy) <= abs(sz):
-            ex, ey, ez = -sz, 0.0, sx
-        else:
-            ex, ey, ez = sy, -sx, 0.0
-        norm = 1.0 / math.sqrt(ex * ex + ey * ey + ez * ez)
-        q[0, i], q[1, i], q[2, i] = ex * norm, ey * norm, ez * norm
-    first, second, root = work[18:21], work[21:24], work[24:27]
-    _shape(
-        work[9:18].reshape(-1), s.reshape(-1), q.reshape(-1), first.reshape(-1), second.reshape(-1), root.reshape(-1)
-    )
-    for i in range(BLOCK):
-        one = first[0, i] * p[0, i] + first[1, i] * p[1, i] + first[2, i] * p[2, i]
-        other = second[0, i] * p[0, i] + second[1, i] * p[1, i] + second[2, i] * p[2, i]
-        along = root[0, i] * one + root[1, i] * other
-        across = root[1, i] * one + root[2, i] * other
-        norm = 1.0 / math.sqrt(along * along + across * across)
-        along, across = along * norm, across * norm
-        sx, sy, sz = s[0, i], s[1, i], s[2, i]
-        ex, ey, ez = q[0, i], q[1, i], q[2, i]
-        qx = along * ex + across * (sy * ez - sz * ey)
-        qy = along * ey + across * (sz * ex - sx * ez)
-        qz = along * ez + across * (sx * ey - sy * ex)
-        quaternion(sx, sy, sz, qx, qy, qz, r, i)
+        source = start + min(i, count - 1)
+        for k in range(out.shape[0]):
+            out[k, i] = rows[source, first + k]
+    return count
+
+
+@njit(**options)
+def write_block(values, count, start, first, rows):
+    """Numbers (m, BLOCK) of a block into rows[start:, first:]."""
+    for i in range(count):
+        for k in range(values.shape[0]):
+            rows[start + i, first + k] = values[k, i]
+
+
+@njit(**entry_options)
+def to_rotations(there, there_par, back, back_par, states, rays):
+    """Rotations rays[:, :4] of states (n, 6 or more)."""
+    x, p, r, s, q = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK), aligned(3, BLOCK), aligned(3, BLOCK)
+    image, derivative = aligned(3, BLOCK), aligned(9, BLOCK)
+    first, second, root = aligned(3, BLOCK), aligned(3, BLOCK), aligned(3, BLOCK)
+    for start in range(0, states.shape[0], BLOCK):
+        count = read_block(states, start, 0, x)
+        read_block(states, start, 3, p)
+        back(x, s, back_par)
+        there(s, image, derivative, there_par)
+        for i in range(BLOCK):
+            # any unit vector across s; the smallest component of s is the safest to cross with
+            sx, sy, sz = s[0, i], s[1, i], s[2, i]
+            if abs(sx) <= abs(sy) and abs(sx) <= abs(sz):
+                ex, ey, ez = 0.0, sz, -sy
+            elif abs(sy) <= abs(sz):
+                ex, ey, ez = -sz, 0.0, sx
+            else:
+                ex, ey, ez = sy, -sx, 0.0
+            norm = 1.0 / math.sqrt(ex * ex + ey * ey + ez * ez)
+            q[0, i], q[1, i], q[2, i] = ex * norm, ey * norm, ez * norm
+        _shape(derivative, s, q, first, second, root)
+        for i in range(BLOCK):
+            one = first[0, i] * p[0, i] + first[1, i] * p[1, i] + first[2, i] * p[2, i]
+            other = second[0, i] * p[0, i] + second[1, i] * p[1, i] + second[2, i] * p[2, i]
+            along = root[0, i] * one + root[1, i] * other
+            across = root[1, i] * one + root[2, i] * other
+            norm = 1.0 / math.sqrt(along * along + across * across)
+            along, across = along * norm, across * norm
+            sx, sy, sz = s[0, i], s[1, i], s[2, i]
+            ex, ey, ez = q[0, i], q[1, i], q[2, i]
+            qx = along * ex + across * (sy * ez - sz * ey)
+            qy = along * ey + across * (sz * ex - sx * ez)
+            qz = along * ez + across * (sx * ey - sy * ex)
+            quaternion(sx, sy, sz, qx, qy, qz, r, i)
+        write_block(r, count, start, 0, rays)
 
 
 @njit(**options)
@@ -205,19 +223,22 @@ def quaternion(sx, sy, sz, qx, qy, qz, r, i):
     r[0, i], r[1, i], r[2, i], r[3, i] = w * norm, x * norm, y * norm, z * norm
 
 
-@njit(**options)
-def from_coordinates(forward, forward_par, r, work, x, p):
-    """Points x and directions p (3, BLOCK) of rotations r (4, BLOCK)."""
-    s, q, first, second, root = work[0:3], work[3:6], work[18:21], work[21:24], work[24:27]
-    columns(r.reshape(-1), s.reshape(-1), q.reshape(-1))
-    forward(s, x, work[9:18], forward_par)
-    one, other, m, pf = first.reshape(-1), second.reshape(-1), root.reshape(-1), p.reshape(-1)
-    _shape(work[9:18].reshape(-1), s.reshape(-1), q.reshape(-1), one, other, m)
-    for i in range(BLOCK):
-        px = m[i] * one[i] + m[BLOCK + i] * other[i]
-        py = m[i] * one[BLOCK + i] + m[BLOCK + i] * other[BLOCK + i]
-        pz = m[i] * one[2 * BLOCK + i] + m[BLOCK + i] * other[2 * BLOCK + i]
-        pf[i], pf[BLOCK + i], pf[2 * BLOCK + i] = px, py, pz
+@njit(**entry_options)
+def from_rotations(there, there_par, rows):
+    """States rows[:, :6] of the rotations that stand in rows[:, :4]."""
+    x, p, r, s, q = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK), aligned(3, BLOCK), aligned(3, BLOCK)
+    derivative = aligned(9, BLOCK)
+    first, second, root = aligned(3, BLOCK), aligned(3, BLOCK), aligned(3, BLOCK)
+    for start in range(0, rows.shape[0], BLOCK):
+        count = read_block(rows, start, 0, r)
+        columns(r.reshape(-1), s.reshape(-1), q.reshape(-1))
+        there(s, x, derivative, there_par)
+        _shape(derivative, s, q, first, second, root)
+        for i in range(BLOCK):
+            for k in range(3):
+                p[k, i] = root[0, i] * first[k, i] + root[1, i] * second[k, i]
+        write_block(x, count, start, 0, rows)
+        write_block(p, count, start, 3, rows)
 
 
 @njit(**options)
@@ -257,30 +278,36 @@ def _frame(derivative, frame):
         frame[3, i], frame[4, i], frame[5, i] = m12 * ux + m22 * vx, m12 * uy + m22 * vy, m12 * uz + m22 * vz
 
 
-@njit(**options)
-def angles_to_coordinates(forward, forward_par, inverse, inverse_par, x, p, work, r):
-    """Coordinates r (4, BLOCK) of points x and directions p (3, BLOCK)."""
-    frame = work[18:24]
-    inverse(x, r[0:3], inverse_par)
-    forward(r[0:3], work[6:9], work[9:18], forward_par)
-    _frame(work[9:18], frame)
-    for i in range(BLOCK):
-        along = p[0, i] * frame[0, i] + p[1, i] * frame[1, i] + p[2, i] * frame[2, i]
-        across = p[0, i] * frame[3, i] + p[1, i] * frame[4, i] + p[2, i] * frame[5, i]
-        r[2, i], r[3, i] = turns(across, along), 0.0
+@njit(**entry_options)
+def to_angles(there, there_par, back, back_par, states, rays):
+    """Coordinates rays[:, :4], the last 0, of states (n, 6 or more)."""
+    x, p, r = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK)
+    image, derivative, frame = aligned(3, BLOCK), aligned(9, BLOCK), aligned(6, BLOCK)
+    for start in range(0, states.shape[0], BLOCK):
+        count = read_block(states, start, 0, x)
+        read_block(states, start, 3, p)
+        back(x, r[0:3], back_par)
+        there(r[0:3], image, derivative, there_par)
+        _frame(derivative, frame)
+        for i in range(BLOCK):
+            along = p[0, i] * frame[0, i] + p[1, i] * frame[1, i] + p[2, i] * frame[2, i]
+            across = p[0, i] * frame[3, i] + p[1, i] * frame[4, i] + p[2, i] * frame[5, i]
+            r[2, i], r[3, i] = turns(across, along), 0.0
+        write_block(r, count, start, 0, rays)
 
 
-@njit(**options)
-def angles_from_coordinates(forward, forward_par, r, work, x, p):
-    """Points x and directions p (3, BLOCK) of coordinates r (4, BLOCK)."""
-    frame = work[18:24]
-    forward(r[0:3], x, work[9:18], forward_par)
-    _frame(work[9:18], frame)
-    cosine, sine = work[24], work[25]
-    for i in range(BLOCK):
-        cosine[i], sine[i] = cosine_sine(r[2, i])
-    for i in range(BLOCK):
-        c, s = cosine[i], sine[i]
-        p[0, i] = c * frame[0, i] + s * frame[3, i]
-        p[1, i] = c * frame[1, i] + s * frame[4, i]
-        p[2, i] = c * frame[2, i] + s * frame[5, i]
+@njit(**entry_options)
+def from_angles(there, there_par, rows):
+    """States rows[:, :6] of the coordinates that stand in rows[:, :4]."""
+    x, p, r = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK)
+    derivative, frame = aligned(9, BLOCK), aligned(6, BLOCK)
+    for start in range(0, rows.shape[0], BLOCK):
+        count = read_block(rows, start, 0, r)
+        there(r[0:3], x, derivative, there_par)
+        _frame(derivative, frame)
+        for i in range(BLOCK):
+            c, s = cosine_sine(r[2, i])
+            for k in range(3):
+                p[k, i] = c * frame[k, i] + s * frame[3 + k, i]
+        write_block(x, count, start, 0, rows)
+        write_block(p, count, start, 3, rows)

@@ -33,14 +33,15 @@ from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
 
-from creeping.kernels.block import BLOCK, options
+from creeping.kernels.block import BLOCK, aligned, entry_options, options
 from creeping.kernels.exponential import inverse_root, turns
 from creeping.kernels.splines import cells_and_fractions, slopes, weights
-from creeping.phaseflow.kernels.rotation import REACH, face, quaternion
+from creeping.phaseflow.kernels.rotation import REACH, face, quaternion, read_block, write_block
 from creeping.phaseflow.kernels.rotation import columns as columns_of
 
 MARGIN = 2.0
-
+WORK = 48
+"""Rows of work space for a block."""
 DEGREE = 5
 LANES = 4
 _double, _index = ir.DoubleType(), ir.IntType(64)
@@ -48,7 +49,7 @@ _vector = ir.VectorType(_double, LANES)
 
 
 @njit(**options)
-def _look_up(table, chart, u, v, work, cell, count):
+def _look_up(table, chart, u, v, work, cell):
     """x, x_u, x_v (BLOCK, 12), flat, of a block; u and v are used up."""
     w, out = work[8:32].reshape(-1), work[32:44].reshape(-1)
     cells = table.shape[1] - DEGREE - 2.0 * MARGIN
@@ -61,7 +62,7 @@ def _look_up(table, chart, u, v, work, cell, count):
             chart[i] = chart[i] * table.shape[axis + 1] + cell[i]
         weights(t, DEGREE, w[12 * axis * BLOCK : (12 * axis + 6) * BLOCK])
         slopes(t, w[(12 * axis + 6) * BLOCK : (12 * axis + 12) * BLOCK])
-    tangents(table, chart, w, count, out)
+    tangents(table, chart, w, out)
     return out
 
 
@@ -75,59 +76,68 @@ def _root(out, i):
     return inverse_root(g11, g12, g22)
 
 
-@njit(**options)
-def from_coordinates(table, r, work, x, p):
-    """Points x and directions p (3, BLOCK) of rotations r (4, BLOCK)."""
+@njit(**entry_options)
+def from_rotations(table, rows):
+    """States rows[:, :6] of the rotations that stand in rows[:, :4]."""
+    x, p, r, work = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK), aligned(WORK, BLOCK)
     s, q, along, across, u, v = work[0:3], work[3:6], work[44], work[45], work[6], work[7]
     chart, cell = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64)
-    columns_of(r.reshape(-1), s.reshape(-1), q.reshape(-1))
-    face(s.reshape(-1), q.reshape(-1), chart, u, v, along, across)
-    out = _look_up(table, chart, u, v, work, cell, BLOCK)
-    for i in range(BLOCK):
-        m11, m12, m22 = _root(out, i)
-        norm = 1.0 / math.sqrt(along[i] * along[i] + across[i] * across[i])
-        one = (m11 * along[i] + m12 * across[i]) * norm
-        other = (m12 * along[i] + m22 * across[i]) * norm
-        for k in range(3):
-            x[k, i] = out[12 * i + k]
-            p[k, i] = one * out[12 * i + 4 + k] + other * out[12 * i + 8 + k]
+    for start in range(0, rows.shape[0], BLOCK):
+        count = read_block(rows, start, 0, r)
+        columns_of(r.reshape(-1), s.reshape(-1), q.reshape(-1))
+        face(s.reshape(-1), q.reshape(-1), chart, u, v, along, across)
+        out = _look_up(table, chart, u, v, work, cell)
+        for i in range(BLOCK):
+            m11, m12, m22 = _root(out, i)
+            norm = 1.0 / math.sqrt(along[i] * along[i] + across[i] * across[i])
+            one = (m11 * along[i] + m12 * across[i]) * norm
+            other = (m12 * along[i] + m22 * across[i]) * norm
+            for k in range(3):
+                x[k, i] = out[12 * i + k]
+                p[k, i] = one * out[12 * i + 4 + k] + other * out[12 * i + 8 + k]
+        write_block(x, count, start, 0, rows)
+        write_block(p, count, start, 3, rows)
 
 
-@njit(**options)
-def to_coordinates(table, inverse, inverse_par, x, p, work, r):
-    """Rotations r (4, BLOCK) of points x and directions p (3, BLOCK)."""
+@njit(**entry_options)
+def to_rotations(table, back, back_par, states, rays):
+    """Rotations rays[:, :4] of states (n, 6 or more)."""
+    x, p, r, work = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK), aligned(WORK, BLOCK)
     s, u, v = work[0:3], work[6], work[7]
-    chart, cell = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64)
-    faces = np.empty(BLOCK, np.int64)
-    inverse(x, s, inverse_par)
-    # of q only the tangents of the chart are wanted: along and across are not used
-    face(s.reshape(-1), s.reshape(-1), chart, u, v, work[44], work[45])
-    for i in range(BLOCK):
-        faces[i], work[46, i], work[47, i] = chart[i], u[i], v[i]
-    out = _look_up(table, chart, u, v, work, cell, BLOCK)
-    for i in range(BLOCK):
-        m11, m12, m22 = _root(out, i)
-        one, other = 0.0, 0.0
-        for k in range(3):
-            one += out[12 * i + 4 + k] * p[k, i]
-            other += out[12 * i + 8 + k] * p[k, i]
-        along, across = m11 * one + m12 * other, m12 * one + m22 * other
-        norm = 1.0 / math.sqrt(along * along + across * across)
-        along, across = along * norm, across * norm
-        axis = faces[i] // 2
-        sign = 1.0 - 2.0 * (faces[i] % 2)
-        sb, sc = sign * s[(axis + 1) % 3, i], s[(axis + 2) % 3, i]
-        un, vn = work[46, i], work[47, i]
-        qa = sign * (-along * sb - across * sc)
-        qb = sign * (along * (1.0 - un * sb) - across * un * sc)
-        qc = -along * vn * sb + across * (1.0 - vn * sc)
-        if axis == 0:
-            qx, qy, qz = qa, qb, qc
-        elif axis == 1:
-            qx, qy, qz = qc, qa, qb
-        else:
-            qx, qy, qz = qb, qc, qa
-        quaternion(s[0, i], s[1, i], s[2, i], qx, qy, qz, r, i)
+    chart, cell, faces = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64)
+    for start in range(0, states.shape[0], BLOCK):
+        count = read_block(states, start, 0, x)
+        read_block(states, start, 3, p)
+        back(x, s, back_par)
+        # of q only the tangents of the chart are wanted: along and across are not used
+        face(s.reshape(-1), s.reshape(-1), chart, u, v, work[44], work[45])
+        for i in range(BLOCK):
+            faces[i], work[46, i], work[47, i] = chart[i], u[i], v[i]
+        out = _look_up(table, chart, u, v, work, cell)
+        for i in range(BLOCK):
+            m11, m12, m22 = _root(out, i)
+            one, other = 0.0, 0.0
+            for k in range(3):
+                one += out[12 * i + 4 + k] * p[k, i]
+                other += out[12 * i + 8 + k] * p[k, i]
+            along, across = m11 * one + m12 * other, m12 * one + m22 * other
+            norm = 1.0 / math.sqrt(along * along + across * across)
+            along, across = along * norm, across * norm
+            axis = faces[i] // 2
+            sign = 1.0 - 2.0 * (faces[i] % 2)
+            sb, sc = sign * s[(axis + 1) % 3, i], s[(axis + 2) % 3, i]
+            un, vn = work[46, i], work[47, i]
+            qa = sign * (-along * sb - across * sc)
+            qb = sign * (along * (1.0 - un * sb) - across * un * sc)
+            qc = -along * vn * sb + across * (1.0 - vn * sc)
+            if axis == 0:
+                qx, qy, qz = qa, qb, qc
+            elif axis == 1:
+                qx, qy, qz = qc, qa, qb
+            else:
+                qx, qy, qz = qb, qc, qa
+            quaternion(s[0, i], s[1, i], s[2, i], qx, qy, qz, r, i)
+        write_block(r, count, start, 0, rays)
 
 
 @intrinsic
@@ -171,10 +181,10 @@ def _contract(typing: Any, table: Any, offset: Any, stride: Any, weights: Any, p
 
 
 @njit(**options)
-def tangents(table, place, w, count, out):
+def tangents(table, place, w, out):
     """x, x_u, x_v of a block's stencils into out (BLOCK, 12), flat; see `_contract` for w."""
     stride = LANES * table.shape[2]
-    for i in range(count):
+    for i in range(BLOCK):
         _contract(table, LANES * place[i], stride, w, i, out, 12 * i)
 
 
