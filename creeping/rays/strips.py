@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import BSpline, NdBSpline
-from scipy.linalg import solve_banded
+from scipy.sparse.linalg import splu
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.geometry.incident import headings, openings
@@ -193,11 +193,9 @@ def _interpolating(places: FloatArray, values: FloatArray, degree: int) -> tuple
     half = (degree + 1) // 2
     ends = np.repeat(places[[0]], degree + 1), np.repeat(places[[-1]], degree + 1)
     knots = np.concatenate([ends[0], places[half:-half], ends[1]])
-    matrix = BSpline.design_matrix(places, knots, degree).todia()
-    below, above = max(-int(matrix.offsets.min()), 0), max(int(matrix.offsets.max()), 0)
-    bands = np.zeros((below + above + 1, len(places)))
-    bands[above - matrix.offsets] = matrix.data
-    return knots, solve_banded((below, above), bands, values.reshape(len(places), -1)).reshape(values.shape)
+    # not LAPACK's banded solver, which updates row by row: threads of its library then wait for each other
+    solver = splu(BSpline.design_matrix(places, knots, degree).tocsc())
+    return knots, solver.solve(values.reshape(len(places), -1)).reshape(values.shape)
 
 
 def strip_rows(fan: RayFan) -> list[IntArray]:
