@@ -1,5 +1,7 @@
 """The equation of a matrix solved for many right sides: all that memory allows share each product with it.
 
+Bodies whose nodes are mirrored have one equation for each parity, with a share of the unknowns (`mirrors`).
+
 Also here: GMRES of several right sides at once: each has its own Krylov space, and all share the products with the
 matrix.
 
@@ -22,19 +24,23 @@ from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import Boundary
 from creeping.field.equation.matrix import Matrix, Places
+from creeping.field.equation.mirrors import Blocks, mirrors_of, no_mirrors
 from creeping.field.equation.split_sums import CURL, ONE_LAYER, TWO_LAYERS, SmoothKernel, SplitSums, best_split
 from creeping.storage.memory import budget
 from creeping.storage.parts import Arrays, Keeping, not_kept
 
-TOGETHER = 2e8
+TOGETHER = 5e8
 """Bytes of what GMRES keeps of right sides that are solved together."""
-DENSE = 8e9
-"""Bytes of a matrix, and of its transpose, that are kept at most."""
+DENSE, SHARE = 4e9, 0.7
+"""Bytes of a scalar matrix that is kept at most: beyond, a product of one column takes longer than its sums; and share
+of the memory's budget, up to which the matrix of a conductor is sooner."""
 
 TOLERANCE, COARSE_TOLERANCE, STEPS = 3e-5, 3e-3, 80
 """Residual of the equation relative to its right side, and most steps. Coarse tiles err by 0.03 % of the largest
 amplitude; 3e-3 gives 0.03 to 0.05 %, 1e-2 gives 0.1 % (cylinders, k = 20 and 40)."""
 
+ODD = 1e-3
+"""Share of the tolerance below which a field of one parity is not worth solving for."""
 ROWS = 4096
 """Rows of the sparse matrix that are made at a time."""
 
@@ -51,9 +57,17 @@ class Columns(NamedTuple):
     steps: int
 
 
-def is_dense(nodes: int, boundary: Boundary) -> bool:
-    """Whether the matrix is kept: else its products are sums (`creeping.field.equation.columns`)."""
-    return 16.0 * nodes**2 * (4 if boundary.kind == "conductor" else 1) <= min(DENSE, budget())
+def matrix_bytes(nodes: int, boundary: Boundary, parts: int) -> float:
+    """Bytes of the matrix in blocks of so many parts of the body that are images of each other."""
+    entries = 8.0 * nodes**2 * (4 if boundary.kind == "conductor" else 1) / parts
+    # one block is transposed
+    return entries * (1 + 1 / parts) if boundary.kind == "soft" else entries
+
+
+def is_dense(nodes: int, boundary: Boundary, parts: int) -> bool:
+    """Whether the matrix is kept: else its products are sums (`SplitProduct`)."""
+    most = SHARE * budget()
+    return matrix_bytes(nodes, boundary, parts) <= (most if boundary.kind == "conductor" else min(DENSE, most))
 
 
 def solved_columns(
@@ -80,32 +94,47 @@ def solved_columns(
         first_guess, tolerance = (right * share * matrix.root[:, None, None]).reshape(nodes * c, -1), COARSE_TOLERANCE
     right[matrix.at] -= 1j * under.reshape(len(matrix.at), *right.shape[1:])
     right = (right * matrix.root[:, None, None]).reshape(nodes * c, -1)
-    products: list[Callable[[ComplexArray], ComplexArray]] = []
     n, columns = right.shape
-    many = max(1, min(columns, int(TOGETHER / (16 * n * (steps + 1)))))
+    mirrors = mirrors_of(matrix.nodes, matrix.root, matrix.boundary)
+    dense = is_dense(nodes, matrix.boundary, len(mirrors.images))
+    if not dense:
+        mirrors = no_mirrors(nodes, c)
+    parts = len(mirrors.images)
+    many = max(1, min(columns, int(parts * TOGETHER / (8 * n * (steps + 1)))))
     values, change, left = np.empty_like(right), np.empty_like(right), np.empty(columns)
+    made: list[Blocks | SplitProduct] = []
     taken = 0
 
     def solved(at: slice) -> Arrays:
-        if not products:
-            products.append(matrix.product if is_dense(nodes, matrix.boundary) else SplitProduct(matrix))
+        if not made:
+            made.append(Blocks(matrix, mirrors) if dense else SplitProduct(matrix))
         if at.start:
             tell(f"right side {at.start} of {columns}")
-        begun, rest = np.zeros((n, 1), dtype=complex), right[:, at]
-        if first_guess is not None:
-            begun = first_guess[:, at]
-            rest = rest - products[0](begun)
-        found = block_gmres(products[0], rest, tolerance, steps, size=np.linalg.norm(right[:, at], axis=0))
-        known = {"values": begun + found.values, "change": found.change}
-        return {**known, "left": found.left, "steps": np.array([found.steps])}
+        rest = mirrors.shares(right[:, at])
+        size = np.linalg.norm(rest, axis=1)
+        begun = np.zeros((parts, 0, 0)) if first_guess is None else mirrors.shares(first_guess[:, at])
+        solution, left, used = np.zeros_like(rest), np.zeros_like(size), 0
+        for number in range(parts):
+            product = partial(made[0].product, number)
+            if begun.size:
+                solution[number] = begun[number]
+                rest[number] -= product(begun[number])
+            # waves along a plane have no odd fields in it but for rounding
+            some = np.flatnonzero(size[number] > tolerance * ODD * np.linalg.norm(size, axis=0))
+            found = block_gmres(product, rest[number][:, some], tolerance, steps, size=size[number, some])
+            solution[number][:, some] += found.values
+            left[number] = np.linalg.norm(rest[number], axis=0)
+            rest[number][:, some], left[number, some] = found.change, found.left * size[number, some]
+            used = max(used, found.steps)
+        share = np.linalg.norm(left, axis=0) / np.maximum(np.linalg.norm(size, axis=0), np.finfo(float).tiny)
+        known = {"values": mirrors.whole(solution), "change": mirrors.whole(rest)}
+        return {**known, "left": share, "steps": np.array([used])}
 
     for first in range(0, columns, many):
         at = slice(first, first + many)
         part = keep(f"columns-{n}-{steps}-{first}", partial(solved, at))
         values[:, at], change[:, at], left[at] = part["values"], part["change"], part["left"]
         taken = max(taken, int(part["steps"][0]))
-    # fields at points make rows of their own
-    matrix.__dict__.pop("whole", None)
     back = matrix.root[:, None, None]
     return Columns(values.reshape(nodes, c, -1) / back, change.reshape(nodes, c, -1) / back, left, taken)
 
@@ -143,11 +172,14 @@ def block_gmres(
     norm = np.linalg.norm(right, axis=0)
     whole = norm if size is None else size
     scale = np.where(whole > 0, whole, 1.0)
-    basis = np.empty((steps + 1, n, m), dtype=complex)
+    # products are of single precision, too
+    basis = np.empty((steps + 1, n, m), dtype=np.complex64)
     basis[0] = right / np.where(norm > 0, norm, 1.0)
     H = np.zeros((m, steps + 1, steps), dtype=complex)
     used, left, y = 0, norm / scale, np.zeros((m, steps), dtype=complex)
     for step in range(steps):
+        if np.all(left <= tolerance):
+            break
         new = product(basis[step])
         # twice, for the sake of rounding
         for _ in range(2):
@@ -166,14 +198,12 @@ def block_gmres(
             found = np.linalg.lstsq(h, first[one], rcond=None)[0]
             y[one, :used] = found
             left[one] = np.linalg.norm(h @ found - first[one]) / scale[one]
-        if np.all(left <= tolerance):
-            break
     change = right - np.einsum("snm,mst,mt->nm", basis[: used + 1], H[:, : used + 1, :used], y[:, :used], optimize=True)
     return Columns(np.einsum("snm,ms->nm", basis[:used], y[:, :used]), change, left, used)
 
 
 class SplitProduct:
-    """Products of a matrix with columns, as `Matrix.product`."""
+    """Products of a matrix that is not kept with columns."""
 
     def __init__(self, matrix: Matrix) -> None:
         self._of, k = matrix, matrix.k
@@ -192,8 +222,8 @@ class SplitProduct:
         self._own = _correction(matrix, nodes, matrix.root, "double")
         self._under = _correction(matrix, inner, matrix.root[matrix.at], "slope" if matrix.soft else "double")
 
-    def __call__(self, values: ComplexArray) -> ComplexArray:
-        """The matrix times columns (n, m)."""
+    def product(self, number: int, values: ComplexArray) -> ComplexArray:
+        """The matrix times columns (n, m); ``number`` is 0, for it is in one block."""
         matrix = self._of
         own, under = self._vectors(values) if matrix.vector else self._scalars(values)
         small = values.astype(np.complex64)

@@ -17,8 +17,9 @@ import numpy as np
 from creeping.errors import SurfaceError
 from creeping.field.boundary import CONDUCTOR, HARD, Boundary, BoundaryLike, scalar_boundaries
 from creeping.field.equation.body_tiles import body_tiles
-from creeping.field.equation.columns import STEPS, TOGETHER, is_dense
-from creeping.field.equation.matrix import EACH, VECTOR
+from creeping.field.equation.columns import STEPS, TOGETHER, is_dense, matrix_bytes
+from creeping.field.equation.matrix import EACH, VECTOR, Places
+from creeping.field.equation.mirrors import mirrors_of
 from creeping.field.equation.split_sums import CURL, ONE_LAYER, TWO_LAYERS, SmoothKernel, best_split
 from creeping.field.equation.tiles import Tiles
 from creeping.geometry.memo import memo
@@ -28,6 +29,8 @@ from creeping.storage.memory import budget
 
 SECONDS, ASKED = 30.0, 300.0
 """What the equation of one incidence may take, unless the caller says, and if it is asked for."""
+PATIENCE = 4.0
+"""Of what one incidence may take, what all of them may by fine tiles: coarse ones take a quarter, and err by 0.1 dB."""
 PRODUCTS = 20
 """Products with the matrix, about, that an incidence takes to the tolerance."""
 LEAST_STEPS, MOST_STEPS = 3, 10
@@ -63,13 +66,17 @@ class Plan(NamedTuple):
 
 
 class Load(NamedTuple):
-    """Of the equation on tiles: nodes; seconds of near tiles, of all made once and of a column's product; bytes."""
+    """Of the equation on tiles: nodes; seconds of near tiles, of all made once and of a column's product; bytes.
+
+    ``parts`` of the body are images of each other (`creeping.field.equation.mirrors`).
+    """
 
     nodes: int
     near: float
     seconds: float
     product: float
     memory: float
+    parts: int
 
 
 def plan_of(
@@ -112,7 +119,7 @@ def _plan(body: Surface, wavenumber: float, kind: Boundary, allowed: float, inci
             refused = f"{load.nodes} nodes take about {takes:.2g} s, more than {allowed:g}"
         effort = Effort(True, products - 1) if coarse else FULL
         plan = Plan(load.nodes, load.seconds + products * columns * load.product, memory, refused, effort)
-        if not refused:
+        if not refused and (coarse or together or plan.seconds <= PATIENCE * allowed):
             break
     return plan
 
@@ -176,17 +183,19 @@ def load_on(tiles: Tiles, wavenumber: float, kind: Boundary) -> Load:
     nodes, vector = len(tiles.points), kind.kind == "conductor"
     near = near_seconds(nodes, tiles.p, kind, flat=tiles.planar)
     entries = float(nodes) ** 2 * (4 if vector else 1)
-    # the matrix and its transpose
-    whole = 16 * entries
-    if is_dense(nodes, kind):
-        return Load(nodes, near, near + pair_seconds(nodes, kind), PER_ENTRY * entries / thread_count(), whole)
+    places = Places.at(tiles.points, tiles.normals, tiles.own_places)
+    parts = len(mirrors_of(places, np.sqrt(tiles.weights), kind).images)
+    whole = matrix_bytes(nodes, kind, parts)
+    if is_dense(nodes, kind, parts):
+        once = (near + pair_seconds(nodes, kind)) / parts
+        return Load(nodes, near, once, PER_ENTRY * entries / parts / thread_count(), whole, parts)
     load = CURL if vector else ONE_LAYER if kind.kind in ("soft", "hard") else TWO_LAYERS
     widths = np.ptp(tiles.points, axis=0)
     # as many points beneath the nodes
-    places = np.concatenate([tiles.points, tiles.points])
-    best = best_split(lambda a: SmoothKernel(wavenumber, widths, a), places, tiles.points, load, np.inf)
+    both = np.concatenate([tiles.points, tiles.points])
+    best = best_split(lambda a: SmoothKernel(wavenumber, widths, a), both, tiles.points, load, np.inf)
     sparse = 2e4 * nodes * (4 if vector else 1) * max(tiles.p, 2) ** 2 / 25
     if best is None:
-        return Load(nodes, near, near, np.inf, whole)
+        return Load(nodes, near, near, np.inf, whole, parts)
     # a split sum of a conductor is of two columns
-    return Load(nodes, near, near, best.seconds / (2 if vector else 1), best.memory + sparse)
+    return Load(nodes, near, near, best.seconds / (2 if vector else 1), best.memory + sparse, parts)

@@ -259,23 +259,11 @@ class Matrix:
         """What edges may radiate that currents do not know."""
         return EdgeTerm(self.tiles, self.k)
 
-    @cached_property
-    def whole(self) -> np.ndarray:
-        """All entries, single precision."""
-        own = self.rows(self.nodes, self.root)
-        own = _transposed(own) if self.soft else np.negative(own, out=own)
-        own[np.diag_indices(len(own))] += 1.0
-        factor = np.complex64(-1j if self.soft else 1j)
-        for first in range(0, len(self.at), BLOCK):
-            at = self.at[first : first + BLOCK]
-            rows = (self.columns * at[:, None] + np.arange(self.columns)).ravel()
-            under = self.inner.part(slice(first, first + BLOCK))
-            own[rows] += factor * self.rows(under, self.root[at], "slope" if self.soft else "double")
-        return own
-
-    def product(self, values: ComplexArray) -> ComplexArray:
-        """The matrix times columns (n, m)."""
-        return np.asarray(self.whole @ values.astype(np.complex64), dtype=complex)
+    def beneath(self, part: IntArray) -> tuple[IntArray, IntArray]:
+        """Which of some nodes (m,) have points beneath them, and which of these they are."""
+        under = np.full(len(self.root), -1)
+        under[self.at] = np.arange(len(self.at))
+        return np.flatnonzero(under[part] >= 0), under[part][under[part] >= 0]
 
     def received(self, places: Places, values: ComplexArray, kind: str = "double") -> ComplexArray:
         """What places (m,) receive of values (n, c) at the nodes: (m, c); of a conductor (n, 2, c) and (m, 2, c).

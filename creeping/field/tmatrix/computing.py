@@ -32,13 +32,12 @@ from creeping.field.equation.body_tiles import body_tiles
 from creeping.field.equation.currents import inside_points
 from creeping.field.equation.effort import PRODUCTS, Load, load_of, load_on, pair_seconds, plan_of
 from creeping.field.equation.matrix import Matrix
-from creeping.field.tmatrix.mirrors import mirrors_of, no_mirrors
+from creeping.field.equation.mirrors import mirrors_of, no_mirrors
 from creeping.field.tmatrix.result import TMatrix
 from creeping.field.tmatrix.solved_waves import SolvedWaves
 from creeping.field.tmatrix.spherical_waves import count, vector_count
 from creeping.geometry.arguments import folder_path, real_array, shown, whole_number
 from creeping.geometry.checks import unit_of
-from creeping.geometry.memo import memo
 from creeping.geometry.surface import Surface, fingerprint
 from creeping.kernels.threads import thread_count
 from creeping.storage.memory import budget, within_budget
@@ -168,14 +167,14 @@ def _computed(
     radius = float(np.max(np.linalg.norm(tiles.points - middle, axis=1)))
     degree = order_for(k * radius) if order is None else order
     matrix = Matrix(tiles, k, kind)
-    mirrors = mirrors_of(matrix, middle)
+    mirrors = mirrors_of(matrix.nodes, matrix.root, kind, middle)
     plan = plan_for(load_on(tiles, FINER * k, kind), kind, degree, len(mirrors.images))
     what = f"the T-matrix of order {degree} at wavenumber {k:g} by {len(tiles.points)} nodes"
     _refuse(plan, what, seconds)
     tell(f"{what}: about {plan.seconds:.2g} s and {plan.memory / 1e9:.2g} GB")
     # what it was begun with, whatever memory is free now
     direct = bool(keep("plan", lambda: {"direct": np.array([plan.direct])})["direct"][0])
-    planes = mirrors if direct else no_mirrors(matrix)
+    planes = mirrors if direct else no_mirrors(len(matrix.root), matrix.columns)
     solved = SolvedWaves(matrix, middle, degree, planes, tell, direct=direct, keep=keep)
     tell("what is left inside")
     return solved.T, solved.extinction(inside_points(body, tiles, 2 * np.pi / k))
@@ -222,15 +221,8 @@ def expected(body: Surface, wavenumber: float, boundary: BoundaryLike) -> Plan:
     kind = CONDUCTOR if len(kinds) == 2 else kinds[0]
     radius = 0.5 * float(np.linalg.norm(np.ptp(np.asarray(body.bounds, dtype=float), axis=0)))
 
-    def parts() -> int:
-        matrix = Matrix(body_tiles(body, FINER * wavenumber, kind), wavenumber, kind)
-        return len(mirrors_of(matrix, _center(body, None)).images)
-
-    # as many at every wavenumber
-    images = (
-        1 if kind.varies else memo(body, f"images of a {'vector' if kind.kind == 'conductor' else 'scalar'}", parts)
-    )
-    return plan_for(load_of(body, FINER * wavenumber, kind), kind, order_for(wavenumber * radius), images)
+    load = load_of(body, FINER * wavenumber, kind)
+    return plan_for(load, kind, order_for(wavenumber * radius), load.parts)
 
 
 def refuse(body: Surface, wavenumber: float, boundary: BoundaryLike, order: int | None, seconds: float) -> None:

@@ -1,8 +1,8 @@
 """The equation of a body solved for the regular waves about a centre, and the outgoing waves of the solutions.
 
-Right sides are waves at the nodes and at the points beneath them, sums that are even or odd in the planes in which the
-nodes are mirrored (`creeping.field.tmatrix.mirrors`): one block of the matrix for each parity. Blocks are factorised in
-single precision. Waves of high degrees are tiny far inside the body's sphere; each is solved as a share of its rms.
+Right sides are waves at the nodes and at the points beneath them, sums that are even or odd in the symmetries of the
+nodes (`creeping.field.equation.mirrors`): one block of the matrix for each parity. Blocks are factorised in single
+precision. Waves of high degrees are tiny far inside the body's sphere; each is solved as a share of its rms.
 
 What is left of a wave inside the body is its error. Plane waves from everywhere have 4 pi sum |.|^2 of it in the mean.
 
@@ -17,9 +17,9 @@ import numpy as np
 
 from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.field.equation.columns import solved_columns
-from creeping.field.equation.matrix import BLOCK, Matrix, Places
-from creeping.field.tmatrix.mirrors import Mirrors, parities
-from creeping.field.tmatrix.spherical_waves import combined, count, gradients, regular, vector_parts
+from creeping.field.equation.matrix import Matrix, Places
+from creeping.field.equation.mirrors import Mirrors, blocks_of
+from creeping.field.tmatrix.spherical_waves import combined, count, gradients, parities, regular, vector_parts
 from creeping.storage.parts import Arrays, Keeping, not_kept
 
 COLUMNS = 512
@@ -61,13 +61,10 @@ class SolvedWaves:
         keep: Keeping = not_kept,
     ) -> None:
         self._of, self._center, self._order, self._mirrors, self._keep = matrix, center, order, mirrors, keep
-        self._sums, which = parities(order, self._mirrors.axes, vector=matrix.vector)
+        self._sums, which = parities(order, self._mirrors.flips, vector=matrix.vector)
         c, part, signs, images = matrix.columns, self._mirrors.part, self._mirrors.signs, self._mirrors.images
-        under = np.full(len(matrix.root), -1)
-        under[matrix.at] = np.arange(len(matrix.at))
-        # nodes of the part with points beneath them, and which these are
-        self._above, self._beneath = np.flatnonzero(under[part] >= 0), under[part][under[part] >= 0]
-        own, beneath = self._waves_at(matrix.nodes.part(part)), self._waves_at(matrix.inner.part(self._beneath))
+        self._above, under = matrix.beneath(part)
+        own, beneath = self._waves_at(matrix.nodes.part(part)), self._waves_at(matrix.inner.part(under))
         # of nodes that are their own images the share that they have of their weight
         self._root = matrix.root[part] / np.sqrt(self._mirrors.times)
         own.sent[:] *= np.repeat(self._root**2, c)[:, None]
@@ -125,7 +122,7 @@ class SolvedWaves:
         def solved(number: int, first: int, right: np.ndarray) -> Arrays:
             if not blocks:
                 tell("integrals between the nodes")
-                blocks.extend(self._blocks())
+                blocks.extend(blocks_of(self._of, self._mirrors))
             if number not in factors:
                 factors.clear()
                 tell(f"factors of block {number + 1} of {len(parts)}")
@@ -141,45 +138,6 @@ class SolvedWaves:
                 made = partial(solved, number, first, found[:, some])
                 found[:, some] = self._keep(f"block-{number}-{first}", made)["values"]
             yield found / root
-
-    def _blocks(self) -> np.ndarray:
-        """Blocks of the matrix by parity, single precision."""
-        matrix, mirrors, c = self._of, self._mirrors, self._of.columns
-        images = mirrors.images
-        m = c * images.shape[1]
-        columns = (c * images[:, :, None] + np.arange(c)).reshape(len(images), -1)
-        signs = mirrors.signs / np.sqrt(mirrors.times)[:, None]
-        signs = signs.reshape(len(images), -1).astype(np.float32)
-        out = np.zeros((len(images), m, m), dtype=np.complex64)
-
-        def add(at: Any, rows: np.ndarray, factor: complex) -> None:
-            """Rows of the matrix, added up over images: sums and differences, one plane after the other."""
-            each: Any = np.stack([rows[:, order] * sign for order, sign in zip(columns, signs, strict=True)])
-            each *= factor
-            planes = each.reshape(*(2,) * len(mirrors.axes), *each.shape[1:])
-            for axis in range(len(mirrors.axes)):
-                even, odd = np.moveaxis(planes, axis, 0)
-                even += odd
-                # even is now e + o: e - o = (e + o) - 2 o
-                odd *= -2
-                odd += even
-            out[:, at] += each
-
-        own = matrix.nodes.part(mirrors.part)
-        for first in range(0, len(mirrors.part), BLOCK):
-            at = slice(first, first + BLOCK)
-            rows = matrix.rows(own.part(at), self._root[at])
-            add(slice(c * first, c * (first + BLOCK)), rows, 1.0 if matrix.soft else -1.0)
-        for block in out:
-            if matrix.soft:
-                block[:] = block.T.copy()
-            block[np.diag_indices(m)] += 1.0
-        for first in range(0, len(self._above), BLOCK):
-            above, beneath = (lane[first : first + BLOCK] for lane in (self._above, self._beneath))
-            under, root = matrix.inner.part(beneath), self._root[above]
-            rows = matrix.rows(under, root, "slope" if matrix.soft else "double")
-            add((c * above[:, None] + np.arange(c)).ravel(), rows, -1j if matrix.soft else 1j)
-        return out
 
     def _iterated(self, given: tuple[np.ndarray, np.ndarray], tell: Callable[[str], None]) -> Iterator[np.ndarray]:
         """Values at all nodes (c n, waves) by GMRES."""

@@ -14,7 +14,11 @@ and so for d_x +- i d_y. Angular momentum L = -i x cross grad does not change th
     M_lm = L psi_lm/[l(l + 1)]^(1/2),   N_lm = curl M_lm/k,   far away  X_lm and i r cross X_lm
 
 the magnetic and the electric multipoles, numbered 2 (l^2 + l + m - 1) for N and one more for M. Waves, numbers and
-phases are those of treams and acoustotreams.
+phases are those of treams and acoustotreams. In the coordinate planes
+
+    psi_lm(P x):   x -> -x   psi_l-m,    y -> -y   (-1)^m psi_l-m,    z -> -z   (-1)^(l+m) psi_lm
+
+so that (psi_lm +- psi_l-m)/2^(1/2) are even or odd; N of psi is as psi, and M, an axial vector, the other way.
 
 Sources: [J98, sec. 9.6 and 9.7]; [BFR24].
 """
@@ -230,3 +234,30 @@ def _both(X: ComplexArray) -> ComplexArray:
     out[:, 0, 0::2], out[:, 1, 0::2] = -1j * X[:, 1], 1j * X[:, 0]
     out[:, :, 1::2] = X
     return out
+
+
+def parities(order: int, flips: tuple[tuple[int, ...], ...], *, vector: bool) -> tuple[Any, IntArray]:
+    """Waves even or odd in each flip as sums of spherical ones, sparse (waves, waves), and the number of their chi.
+
+    A flip turns the signs of coordinates, of those axes.
+    """
+    from scipy.sparse import csr_array, eye_array
+
+    deg, m, kind = vector_degrees(order) if vector else (*degrees(order), None)
+    n = len(deg)
+    paired = any({0, 1} & set(axes) for axes in flips)
+    sums = eye_array(n, format="csr")
+    if paired:
+        number, other = np.arange(n), np.arange(n) - 2 * m * (2 if vector else 1)
+        half = np.sqrt(0.5)
+        # even ones stand at m > 0, odd ones at m < 0
+        own = np.where(m > 0, half, np.where(m < 0, -half, 1.0))
+        cross = np.where(m == 0, 0.0, half)
+        sums = csr_array((np.concatenate([own, cross]), (np.tile(number, 2), np.concatenate([number, other]))), (n, n))
+    t = np.where(m < 0, -1, 1)
+    even = {0: t, 1: t * (-1) ** (m % 2), 2: (-1) ** ((deg + m) % 2)}
+    sign = 1 if kind is None else np.where(kind == 1, 1, -1)
+    which = np.zeros(n, dtype=np.int64)
+    for axes in flips:
+        which = 2 * which + (np.prod([even[axis] * sign for axis in axes], axis=0) < 0)
+    return sums, which

@@ -12,8 +12,8 @@ from creeping.field.boundary import scalar_boundaries
 from creeping.field.equation.body_tiles import body_tiles
 from creeping.field.equation.currents import inside_points
 from creeping.field.equation.matrix import Matrix
+from creeping.field.equation.mirrors import mirrors_of, no_mirrors
 from creeping.field.tmatrix import computing
-from creeping.field.tmatrix.mirrors import mirrors_of, no_mirrors
 from creeping.field.tmatrix.solved_waves import SolvedWaves
 from creeping.field.tmatrix.spherical_waves import degrees, vector_degrees
 
@@ -102,34 +102,17 @@ def test_mirrors_change_nothing(body, times, boundary):
     kind = computing.CONDUCTOR if len(kinds) == 2 else kinds[0]
     tiles = body_tiles(body, k, kind)
     matrix = Matrix(tiles, k, kind)
-    planes = mirrors_of(matrix, np.zeros(3))
-    assert planes.axes == (0, 1, 2) and len(planes.images) == 8 and set(planes.times) == times
+    planes = mirrors_of(matrix.nodes, matrix.root, kind, np.zeros(3))
+    assert planes.flips == ((0,), (1,), (2,)) and len(planes.images) == 8 and set(planes.times) == times
     assert set(planes.images.ravel()) == set(range(len(tiles.points)))
     assert np.sum(8 / planes.times) == len(tiles.points)
-    both = [SolvedWaves(matrix, np.zeros(3), 4, some, print, direct=True) for some in (planes, no_mirrors(matrix))]
+    none = no_mirrors(len(matrix.root), matrix.columns)
+    both = [SolvedWaves(matrix, np.zeros(3), 4, some, print, direct=True) for some in (planes, none)]
     assert np.abs(both[0].T - both[1].T).max() < 2e-6
     x = inside_points(body, tiles, 2 * np.pi / k)
     left = [one.extinction(x) for one in both]
     # rounding is single, and at the edge of a conductor more is left
     assert left[0] == pytest.approx(left[1], rel=1e-2, abs=2e-5) and left[0] < 3e-3
-
-
-def test_nodes_of_a_tip_may_be_next_to_a_plane():
-    body, k = sc.Almond(1.0), 20.0
-    kind = scalar_boundaries("pec")[0]
-    matrix = Matrix(body_tiles(body, k, kind), k, kind)
-    planes = mirrors_of(matrix, np.mean(body.bounds, axis=0))
-    assert np.abs(matrix.nodes.points[:, 2]).min() < 1e-5 and planes.axes == (1, 2)
-    assert sorted(planes.images.ravel()) == list(range(len(matrix.root)))
-
-
-def test_a_centre_off_the_planes_and_an_admittance_that_varies_have_no_mirrors():
-    body = sc.Sphere(0.4)
-    kind = scalar_boundaries("hard")[0]
-    matrix = Matrix(body_tiles(body, 2.0, kind), 2.0, kind)
-    assert mirrors_of(matrix, np.array([0.0, 0.0, 0.1])).axes == (0, 1)
-    varying = scalar_boundaries(cr.ImpedanceBoundary(lambda x: 0.5 + 0.1 * x[:, 0]))[0]
-    assert mirrors_of(Matrix(matrix.tiles, 2.0, varying), np.zeros(3)).axes == ()
 
 
 def test_gmres_serves_where_the_matrix_is_too_large(monkeypatch):
