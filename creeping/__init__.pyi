@@ -9,8 +9,6 @@ from .errors import SurfaceError as SurfaceError
 from .errors import ToleranceError as ToleranceError
 from .field.body_currents import surface_currents as surface_currents
 from .field.boundary import ImpedanceBoundary as ImpedanceBoundary
-from .field.conductor.near import conductor_current as conductor_current
-from .field.conductor.near import conductor_field as conductor_field
 from .field.currents.whole_body import SurfaceCurrents as SurfaceCurrents
 from .field.cut_result import FieldCut as FieldCut
 from .field.cut_result import field_cut as field_cut
@@ -18,7 +16,9 @@ from .field.equation.solution import Solution as Solution
 from .field.equation.solving import solve as solve
 from .field.far import far_field as far_field
 from .field.frequency import wavenumber as wavenumber
+from .field.near import conductor_field as conductor_field
 from .field.near import near_field as near_field
+from .field.on_body import conductor_current as conductor_current
 from .field.on_body import surface_field as surface_field
 from .field.ports.coupling_result import Coupling as Coupling
 from .field.ports.coupling_result import CouplingPaths as CouplingPaths

@@ -32,18 +32,12 @@ import numpy as np
 from creeping._typing import ArrayLike
 from creeping.errors import SurfaceError
 from creeping.field.arguments import checked, checked_method, checked_plain, observers_of
-from creeping.field.body_currents import (
-    affordable,
-    cached_currents,
-    expected_nodes,
-    has_expansions,
-    solution_of_pieces,
-    surface_currents,
-)
+from creeping.field.body_currents import surface_currents
 from creeping.field.boundary import BoundaryLike, scalar_boundaries
 from creeping.field.currents.far_sum import far_by_currents
-from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.field.problem import Problem
 from creeping.field.results.far_result import FarField
+from creeping.field.routes import expected_nodes, far_currents
 from creeping.field.validity_range import validity
 from creeping.field.waves.far_geometry import far_geometry
 from creeping.field.waves.far_rays import field_of
@@ -143,28 +137,12 @@ def far_in_parts(
     """The same, what is ready of it given to ``keep``: ``rays-`` of some directions after the other, or sums."""
     one_of(fan, "fan", RayFan, "creeping.launch")
     checked_plain(fan.body)
-    kinds = scalar_boundaries(boundary)
+    scalar_boundaries(boundary)
     k = checked(wavenumber, order, fan.body)
     checked_method(method, order)
     r = observers_of(observation)
-    piecewise, solve = is_piecewise(fan.body), True if method == "equation" else None
-    serve = has_expansions(fan.body, boundary) and (order == 2 or not piecewise)
-    auto = method == "auto" and order == 2 and len(r) > 0
-    # a conductor's sums are of six columns, those of one scalar problem of one to four
-    cheap = serve and auto and affordable(fan, len(kinds) * len(r), k, distant=True)
-    # there are no modes of an admittance that varies
-    must = solve or (serve and (method == "currents" or (method == "auto" and kinds[0].varies and not piecewise)))
-    currents: SurfaceCurrents | None = None
-    if auto and piecewise:
-        # edges diffract, and currents go across joints: the equation alone knows how
-        solved = solution_of_pieces(fan, k, boundary)
-        currents = solved.currents if solved else None
-    if not currents and (must or cheap):
-        try:
-            currents = cached_currents(fan, k, boundary, solve=solve)
-        except SurfaceError:
-            if must:
-                raise
+    piecewise = is_piecewise(fan.body)
+    currents = far_currents(Problem(fan, k, boundary, order, method), len(r))
     if currents:
         # the equation knows of tips, expansions do not
         left_out = tip_waves(fan, k) if piecewise and not currents.solved else 0.0
@@ -184,6 +162,7 @@ def far_in_parts(
 
     far = FarField.joined([_kept(keep, f"rays-{some.start}", partial(some_of, some)) for some in parts])
     far = replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
+    auto = method == "auto" and order == 2 and len(r) > 0
     level = measured_level(fan, k, boundary) if auto else None
     return level.applied(far) if level else far
 

@@ -7,10 +7,10 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import SurfaceError
-from creeping.field.body_currents import affordable
 from creeping.field.boundary import BoundaryLike, parse_boundary, scalar_boundaries
 from creeping.field.far import far_field
 from creeping.field.results.far_result import FarField
+from creeping.field.routes import affordable
 from creeping.field.validity_range import launch_validity, validities
 from creeping.field.waves.far_geometry import FarGeometry
 from creeping.field.waves.far_rays import Parts, parts_of

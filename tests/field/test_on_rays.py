@@ -5,7 +5,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.field.on_body import creeps, ray_envelope, ray_magnitude
+from creeping.field.on_rays import creeps, ray_envelope, ray_magnitude
 
 
 @pytest.mark.parametrize("boundary", ["soft", "hard", cr.ImpedanceBoundary(0.3 - 0.1j)])

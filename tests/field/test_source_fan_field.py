@@ -5,7 +5,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.field.on_body import ray_magnitude
+from creeping.field.on_rays import ray_magnitude
 from creeping.geometry.surface import normal
 from tests.reference import clouds
 from tests.reference.fundamental import beside_source
