@@ -16,7 +16,9 @@ epsilon, in directions spread over the sphere. With e the error that rays state 
 e falls as fast as the order that it is of; of a conductor, whose second order is a rule away from the sphere, a level
 above 1 tells of a term of first order, and grows like k. The second term is what rays and currents both lack.
 
-Sources: [LK59], [CK13]; Derivations, F10 to F17 and F17.
+Also here: how uncertain a far field is because its body is known only approximately.
+
+Sources: [LK59], [CK13]; Derivations, F10 to F17.
 """
 
 # help() shows names of types instead of what they stand for
@@ -29,12 +31,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from creeping._typing import ArrayLike
+from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import SurfaceError
 from creeping.field.arguments import checked, checked_method, checked_plain, observers_of
 from creeping.field.body_currents import surface_currents
 from creeping.field.boundary import BoundaryLike, scalar_boundaries
-from creeping.field.currents.far_sum import far_by_currents
+from creeping.field.currents.whole_body import far_by_currents
 from creeping.field.problem import Problem
 from creeping.field.results.far_result import FarField
 from creeping.field.routes import expected_nodes, far_currents
@@ -49,6 +51,7 @@ from creeping.geometry.memo import memo
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
+from creeping.rays.uncertain_body import coarse_factor, coarse_fan
 from creeping.storage.memory import blocks, within_budget
 from creeping.storage.parts import Keeping, not_kept
 
@@ -249,3 +252,53 @@ def _measured(fan: RayFan, k0: float, boundary: BoundaryLike) -> Level | None:
         return None
     factor = float(np.clip(np.quantile(ratio, 0.95), *LEVELS))
     return Level(k0, factor, float(shared), currents.unserved)
+
+
+def far_field_uncertainty(
+    fan: RayFan, observation: ArrayLike, *, wavenumber: float, boundary: BoundaryLike = "soft", order: int = 2
+) -> FloatArray | None:
+    """Change of the far field when the body is replaced by its second fit (`coarse_fit`).
+
+    Shadow line and rays are computed again on the second fit. The change is about the error of the less accurate fit.
+    Where the second fit uses a coarser grid that resolves the body, it is two to four times the error of the fan's
+    field. For a subdivided mesh it is multiplied by ``coarse_factor`` and is about the error of the fan's field. The
+    error of the asymptotic method is not included.
+
+    Parameters
+    ----------
+    fan : RayFan
+        Of a body from a file; see `creeping.rays.uncertain_body`.
+    observation, wavenumber, boundary, order
+        As for `far_field`.
+
+    Returns
+    -------
+    (m,) or (m, 2, 2), L, or None
+        |f - f on the second fit| times ``coarse_factor``; None for a body that is known exactly.
+
+    Raises
+    ------
+    InvalidInputError
+        For the reasons given at `far_field`.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> fan = cr.launch(cr.DirectFlow(ball), cr.shadow_line(ball, direction=(0, 0, 1)), length=0.5, n_rays=8)
+    >>> cr.far_field_uncertainty(fan, [(0, 0, -1)], wavenumber=30.0) is None    # a sphere is known exactly
+    True
+    """
+    one_of(fan, "fan", RayFan, "creeping.launch")
+    checked_plain(fan.body)
+    scalar_boundaries(boundary)
+    checked(wavenumber, order)
+    observers_of(observation)
+    other = coarse_fan(fan)
+    if other is None:
+        return None
+    mine, its = (
+        far_field(one, observation, wavenumber=wavenumber, boundary=boundary, order=order) for one in (fan, other)
+    )
+    return coarse_factor(fan) * np.abs(mine.total - its.total)

@@ -37,22 +37,27 @@ were set on four bodies (`studies.accuracy.point_coverage`).
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
+from creeping._progress import say
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.arguments import observers_of
-from creeping.field.boundary import Boundary
+from creeping.field.arguments import UNRESOLVED, observers_of
+from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
 from creeping.field.currents.bounce import received
 from creeping.field.currents.radiation import far_of_scalar, field_of_scalar, phase_sums
+from creeping.field.results.far_result import FarField
 from creeping.geodesics.bundle import as_points
+from creeping.geometry.checks import unit_of
 from creeping.geometry.parts import inside
 from creeping.geometry.quadrature import body_nodes, inner_points
 from creeping.geometry.surface import Surface
+from creeping.storage.parts import Keeping, not_kept
 
 DEPTH = 0.25
 """Least depth, in wavelengths, of the points inside at which currents are judged: nearer the sums over nodes err."""
@@ -389,3 +394,40 @@ def level_at(
     away = np.linalg.norm(points - middle, axis=1)
     in_shadow = shadow / np.hypot(1, away / (currents.wavenumber * mean**2))
     return np.asarray(np.where(dark, in_shadow, lit / np.hypot(1, away / mean)))
+
+
+def far_by_currents(
+    currents: SurfaceCurrents,
+    r: FloatArray,
+    boundary: BoundaryLike,
+    *,
+    left_out: float = 0.0,
+    keep: Keeping = not_kept,
+) -> FarField:
+    """Far field in unit directions (m, 3); its error is that of the currents and ``left_out``, L.
+
+    ``keep`` has each sum over nodes, which takes as long for all directions as for a few.
+    """
+
+    def summed(name: str, make: Callable[[], Any]) -> Any:
+        say(f"sums over currents, {name}")
+        return keep(f"currents-{name}", lambda: {"f": make()})["f"]
+
+    lit = summed("lit", lambda: currents.far_of(currents.lit, r))
+    dark = summed("dark", lambda: currents.far_of(~currents.lit, r))
+    error = np.hypot(summed("error", lambda: currents.error(r)), left_out)
+    largest = np.max(np.abs(np.concatenate([lit + dark, currents.far(currents.direction[None])])))
+    off = ~(error < UNRESOLVED * largest)
+    return FarField(
+        directions=r.copy(),
+        total=lit + dark,
+        parts={"lit": lit, "dark": dark},
+        method=np.full(len(r), "equation" if currents.solved else "currents", dtype="<U16"),
+        unresolved=off.any(axis=tuple(range(1, off.ndim))),
+        error=error,
+        error_by="extinction",
+        wavenumber=currents.wavenumber,
+        boundary=boundary_name(boundary),
+        order=2,
+        unit=unit_of(currents.body),
+    )

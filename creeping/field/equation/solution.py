@@ -18,8 +18,7 @@ from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import observers_of
 from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
-from creeping.field.currents.far_sum import far_by_currents
-from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.field.currents.whole_body import SurfaceCurrents, far_by_currents
 from creeping.field.equation.columns import solved_columns
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents, charges, twice_incident
 from creeping.field.equation.effort import FULL, Effort

@@ -37,7 +37,7 @@ from creeping.field.creeping_modes import fock_scale, slowest_decay
 from creeping.field.results.point_result import FieldStatus
 from creeping.field.waves.far_geometry import fan_strips
 from creeping.field.waves.near_wave import first_order_share
-from creeping.field.waves.source_waves import left_out
+from creeping.field.waves.shed_wave import left_out
 from creeping.rays.fan import RayFan
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays
