@@ -7,11 +7,10 @@ Sources: Derivations, F16 to F18 and F36.
 """
 
 from dataclasses import replace
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from creeping._typing import Any, FloatArray
+from creeping._typing import FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, scalar_boundaries
@@ -23,6 +22,7 @@ from creeping.field.equation import solving
 from creeping.field.equation.solving import Solved, asked_solution, solution_for
 from creeping.field.problem import has_expansions
 from creeping.geometry.arguments import one_of
+from creeping.geometry.memo import memo_of
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
@@ -35,7 +35,6 @@ POOR = 0.01
 err by ten times that."""
 KEPT = 2
 """Currents kept with a fan, of so many wavenumbers and boundaries."""
-_CURRENTS: "WeakKeyDictionary[RayFan, dict[Any, SurfaceCurrents]]" = WeakKeyDictionary()
 
 
 def surface_currents(
@@ -184,10 +183,8 @@ def cached_currents(
     InvalidInputError, SurfaceError
         As `surface_currents`.
     """
-    kept = _CURRENTS.setdefault(fan, {})
-    key = (wavenumber, boundary, solve)
-    if key not in kept:
-        while len(kept) >= KEPT:
-            kept.pop(next(iter(kept)))
-        kept[key] = surface_currents(fan, wavenumber=wavenumber, boundary=boundary, solve=solve)
-    return kept[key]
+
+    def make() -> SurfaceCurrents:
+        return surface_currents(fan, wavenumber=wavenumber, boundary=boundary, solve=solve)
+
+    return memo_of(fan, "currents", (wavenumber, boundary, solve), make, KEPT)

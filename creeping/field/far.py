@@ -39,7 +39,7 @@ from creeping.field.boundary import BoundaryLike, scalar_boundaries
 from creeping.field.currents.whole_body import far_by_currents
 from creeping.field.problem import Problem
 from creeping.field.results.far_result import FarField
-from creeping.field.routes import expected_nodes, far_currents
+from creeping.field.routes import TRUST, expected_nodes, far_currents
 from creeping.field.validity_range import validity
 from creeping.field.waves.far_geometry import far_geometry
 from creeping.field.waves.far_rays import field_of
@@ -61,12 +61,6 @@ directions before is kept; and for each k size, the fan integral."""
 
 TOGETHER = 1024
 """Directions by rays that are kept at a time: some seconds of work."""
-NODES = 50_000
-"""Nodes of the currents that rays are compared with: some tenths of a second."""
-DIRECTIONS = 200
-"""Directions of the comparison."""
-LEVELS = (0.2, 50.0)
-"""Least and largest level that is believed: beyond, what errs at k0 is not what errs at k."""
 
 
 def far_field(
@@ -229,7 +223,7 @@ def measured_level(fan: RayFan, wavenumber: float, boundary: BoundaryLike) -> Le
     # whatever the wavenumber, so that many have the comparison in common
     highest = 100 / size(fan.body)
     for _ in range(3):
-        highest *= np.sqrt(NODES / max(expected_nodes(fan, highest), 1))
+        highest *= np.sqrt(TRUST.level_nodes / max(expected_nodes(fan, highest), 1))
     k0 = min(wavenumber, float(highest))
     return memo(fan, f"level {boundary} {k0!r}", lambda: _measured(fan, k0, boundary))
 
@@ -240,7 +234,7 @@ def _measured(fan: RayFan, k0: float, boundary: BoundaryLike) -> Level | None:
         currents = surface_currents(fan, wavenumber=k0, boundary=boundary, solve=False)
     except SurfaceError:
         return None
-    r = fibonacci_directions(DIRECTIONS)
+    r = fibonacci_directions(TRUST.level_directions)
     geometry = far_geometry(fan, r)
     rays = field_of(geometry, k0, boundary, 2)
     off = np.abs(rays.total - currents.far(r))
@@ -250,7 +244,7 @@ def _measured(fan: RayFan, k0: float, boundary: BoundaryLike) -> Level | None:
     shared = currents.extinction * currents.mean_amplitude
     if not len(ratio) or not np.isfinite(shared):
         return None
-    factor = float(np.clip(np.quantile(ratio, 0.95), *LEVELS))
+    factor = float(np.clip(np.quantile(ratio, 0.95), *TRUST.levels))
     return Level(k0, factor, float(shared), currents.unserved)
 
 

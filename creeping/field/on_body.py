@@ -36,7 +36,7 @@ from creeping.field.currents.nodes import TAKEN_OVER, axes_of_incidence, lit_par
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation.currents import ON_BODY, ConductorTileCurrents, TileCurrents, along_body
 from creeping.field.lit_ground import composed, lit_error, without_tips
-from creeping.field.marching.fan_waves import fan_waves, march_alone, marched_sums, marches, scalar_on_rays
+from creeping.field.marching.fan_waves import fan_waves, march_alone, marched_sums, scalar_on_rays
 from creeping.field.on_rays import own_waves
 from creeping.field.problem import Problem
 from creeping.field.results.conductor_result import ConductorCurrent, vector_on_body
@@ -49,7 +49,7 @@ from creeping.field.results.point_result import (
     measured_field,
     scalar_on_body,
 )
-from creeping.field.routes import currents_behind, left_behind, stands_alone
+from creeping.field.routes import currents_behind, left_behind, marches, stands_alone
 from creeping.field.waves.beams import wide
 from creeping.field.waves.far_geometry import fan_strips
 from creeping.field.waves.ray_sums import RaySum, own_error, ray_sum, total_of

@@ -22,15 +22,18 @@ import numpy as np
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.body_currents import CUT, cached_currents, solution_of_pieces
-from creeping.field.boundary import BoundaryLike, scalar_boundaries
+from creeping.field.boundary import Boundary, BoundaryLike, scalar_boundaries
 from creeping.field.currents.bounce import may_self_reflect
 from creeping.field.currents.nodes import RAYS, STEPS
 from creeping.field.currents.radiation import grid_cells, transformed
 from creeping.field.currents.whole_body import POINTS, SurfaceCurrents
 from creeping.field.equation.effort import expected_seconds_of, too_much
 from creeping.field.lit_ground import convex
+from creeping.field.marching.fan_waves import marchable
 from creeping.field.problem import Problem, has_expansions
 from creeping.field.results.point_result import FieldStatus, PointValues
+from creeping.field.waves.beams import seconds as beam_seconds
+from creeping.field.waves.far_geometry import fan_strips
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.quadrature import node_count
 from creeping.rays.fan import RayFan
@@ -57,6 +60,12 @@ class Trust:
         What sums for both fields of a polarisation cost, in terms of a scalar's.
     lit : float
         Share of a body's nodes that are lit or in the penumbra.
+    beams : float
+        Seconds that beams may take where marched waves merge; beyond, creeping modes serve.
+    level_nodes, level_directions : int
+        Nodes of the currents that rays are compared with, some tenths of a second, and directions of the comparison.
+    levels : (float, float)
+        Least and largest level that is believed: beyond, what errs at k0 is not what errs at k.
     fine, fine_vector : float
         Error of rays up to which currents are not asked, of a scalar field and of a conductor's.
     """
@@ -68,6 +77,10 @@ class Trust:
     seconds: float = 3.3e-9
     vector: float = 1.5
     lit: float = 0.6
+    beams: float = 60.0
+    level_nodes: int = 50_000
+    level_directions: int = 200
+    levels: tuple[float, float] = (0.2, 50.0)
     fine: float = 0.01
     fine_vector: float = 1e-4
 
@@ -140,6 +153,11 @@ def expected_seconds(fan: RayFan, wavenumbers: FloatArray, directions: int, boun
     if not (unserved or may_self_reflect(fan.body)) and has_expansions(fan.body, boundary):
         return plain
     return plain + sum(expected_seconds_of(fan.body, k, boundary) for k in known)
+
+
+def marches(fan: RayFan, boundary: Boundary, order: int, count: int, wavenumber: float) -> bool:
+    """Whether the waves of a fan can be marched, and cost little enough at ``count`` points."""
+    return marchable(fan, boundary, order) and beam_seconds(fan, fan_strips(fan), wavenumber, count) < TRUST.beams
 
 
 def affords(problem: Problem, places: int) -> bool:

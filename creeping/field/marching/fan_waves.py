@@ -19,7 +19,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -31,11 +30,12 @@ from creeping.field.marching.fan_rays import FLAT, fan_profiles, wide_rows
 from creeping.field.marching.layer import MarchedRays, march_rays
 from creeping.field.marching.plan import MarchStatus
 from creeping.field.results.point_result import columns_of
-from creeping.field.waves.beams import STRONG, Components, beams_beside_rays, blended_sum, seconds, variation, wide
+from creeping.field.waves.beams import STRONG, Components, beams_beside_rays, blended_sum, variation, wide
 from creeping.field.waves.far_geometry import fan_strips
 from creeping.field.waves.gaussian_beams import MOST_TURNED
 from creeping.field.waves.ray_sums import RaySum
 from creeping.field.waves.strip_waves import StripTable, around, modes_on_strip
+from creeping.geometry.memo import memo_of
 from creeping.geometry.piecewise import has_edges, is_piecewise
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan
@@ -55,10 +55,6 @@ TWISTED = 0.4
 FAVOUR = {"electric hard": 0.5}
 """How much more the error of modes counts than that of the march, 1 if not named: measured against the equation on
 three ellipsoids and a sphere, k = 10 and 20, among 0.05 to 2."""
-_WAVES: "WeakKeyDictionary[RayFan, dict[tuple[float, Boundary], FanWaves]]" = WeakKeyDictionary()
-
-LONGEST = 60.0
-"""Seconds that beams may take."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,22 +212,15 @@ def marchable(fan: RayFan, boundary: Boundary, order: int, fewest: int = FEWEST_
 
 def fan_waves(fan: RayFan, *, wavenumber: float, boundary: Boundary) -> FanWaves:
     """Marched waves of a fan, made once for each of the last wavenumbers and boundaries."""
-    kept = _WAVES.setdefault(fan, {})
-    key = (wavenumber, boundary)
-    if key not in kept:
-        while len(kept) >= KEPT:
-            kept.pop(next(iter(kept)))
+
+    def make() -> FanWaves:
         marched = march_rays(fan_profiles(fan, boundary=boundary), wavenumber=wavenumber, boundary=boundary)
         times = np.linspace(0.0, fan.length, int(np.max(marched.counts, initial=FEWEST)) + 1)
         ends = np.where(np.isin(fan.status, AT_CREASES), fan.detachment, np.inf)
         alone = march_alone(fan.body, boundary)
-        kept[key] = FanWaves(fan_strips(fan), wide_rows(fan), marched, times, boundary, alone, ends)
-    return kept[key]
+        return FanWaves(fan_strips(fan), wide_rows(fan), marched, times, boundary, alone, ends)
 
-
-def marches(fan: RayFan, boundary: Boundary, order: int, count: int, wavenumber: float) -> bool:
-    """Whether the waves of a fan can be marched, and cost little enough at ``count`` points."""
-    return marchable(fan, boundary, order) and seconds(fan, fan_strips(fan), wavenumber, count) < LONGEST
+    return memo_of(fan, "marched waves", (wavenumber, boundary), make, KEPT)
 
 
 class OnRays(NamedTuple):

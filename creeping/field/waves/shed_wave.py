@@ -27,8 +27,6 @@ What is left out is of the size τ⁴ e⁵/64 and (τ e²/4)², and where curvat
 Sources: [AS64, sec. 9.3]; Derivations, F4 to F7 and R19.
 """
 
-from weakref import WeakKeyDictionary
-
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
@@ -37,6 +35,7 @@ from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import BETA, decay_slopes, decay_terms, modes_of
 from creeping.field.special.airy import MODES, Modes
 from creeping.field.special.fock import SERIES, pekeris_slope, pekeris_star, pole
+from creeping.geometry.memo import memo
 from creeping.kernels.threads import in_slices
 from creeping.rays.quantities import RayPoints
 
@@ -47,8 +46,6 @@ EACH = 5e-6
 """Seconds of a block of the sum, about."""
 SOURCE_VARIES, NEXT = 1 / 16, 2.0
 """Weight of τ³ e ρ1'/m1 in the error, and how much is added to |τ| of the first mode at ξ = 0."""
-_NUMBERS: "WeakKeyDictionary[RayPoints, FloatArray]" = WeakKeyDictionary()
-"""What `_numbers_of` has found of rays that are still in use."""
 
 
 def smoothstep(x: FloatArray, start: float, end: float) -> FloatArray:
@@ -297,7 +294,7 @@ def _numbers_of(rays: RayPoints) -> FloatArray:
     from creeping.field.kernels.ray_profile import LANES
     from creeping.kernels.block import BLOCK
 
-    if rays not in _NUMBERS:
+    def make() -> FloatArray:
         n = len(rays.time)
         found = np.zeros((LANES, -(-n // BLOCK) * BLOCK))
         curved = [kappa > 0 for kappa in rays.curvature]
@@ -309,8 +306,9 @@ def _numbers_of(rays: RayPoints) -> FloatArray:
         )
         # in the order of the lanes: what is of both ends stands side by side
         found[:, :n] = np.stack([*rays.integrals[:, 1:].T, *(end for pair in ends for end in pair)])
-        _NUMBERS[rays] = found
-    return _NUMBERS[rays]
+        return found
+
+    return memo(rays, "numbers of the sum over modes", make)
 
 
 def _constants_of(boundary: Boundary) -> FloatArray:
