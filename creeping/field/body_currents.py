@@ -14,9 +14,9 @@ from creeping._typing import FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, scalar_boundaries
-from creeping.field.currents.bounce import self_reflects
 from creeping.field.currents.conductor import ConductorCurrents, conductor_waves
 from creeping.field.currents.nodes import LitNodes, lit_nodes, lit_waves, ray_nodes, ray_waves
+from creeping.field.currents.radiation import self_reflects
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation import solving
 from creeping.field.equation.solving import Solved, asked_solution, solution_for

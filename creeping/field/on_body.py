@@ -3,7 +3,7 @@
     u = (1 - W) u_lit + sum_rays w_i u_i,   W = W(xi; 0, 0.6),   w_i = W for rays that have just left the line
 
 with u_lit the lit side's expansion (`creeping.field.currents.lit`), which holds to a little beyond the line, and what
-that side receives from other parts of the body (`creeping.field.currents.bounce`); w_i is 1 for rays that come from
+that side receives from other parts of the body (`creeping.field.currents.radiation`); w_i is 1 for rays that come from
 afar. Waves along rays are marched, with beams where rays merge (`creeping.field.marching.fan_waves`), or are creeping
 modes where the march is impossible or would take too long. `creeping.field.lit_ground` says how far it is off. On a
 body that may reflect onto itself, hides part of its line, or has edges, joints or tips, or if it is asked for, the

@@ -23,9 +23,8 @@ from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.body_currents import CUT, cached_currents, solution_of_pieces
 from creeping.field.boundary import Boundary, BoundaryLike, scalar_boundaries
-from creeping.field.currents.bounce import may_self_reflect
 from creeping.field.currents.nodes import RAYS, STEPS
-from creeping.field.currents.radiation import grid_cells, transformed
+from creeping.field.currents.radiation import grid_cells, may_self_reflect, transformed
 from creeping.field.currents.whole_body import POINTS, SurfaceCurrents
 from creeping.field.equation.effort import expected_seconds_of, too_much
 from creeping.field.lit_ground import convex

@@ -35,13 +35,13 @@ import numpy as np
 from creeping._typing import BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.arguments import fock_parameter, scales, transverse_ratios
 from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT
-from creeping.field.currents.bounce import received_vectors
 from creeping.field.currents.lit import STEEPEST, lit_conductor
 from creeping.field.currents.nodes import LitNodes, RayNodes
 from creeping.field.currents.radiation import (
     electric_field_of_vector,
     far_of_vector,
     magnetic_field_of_vector,
+    received_vectors,
 )
 from creeping.field.currents.whole_body import SurfaceCurrents, level_at
 from creeping.field.marching.fan_rays import FLAT

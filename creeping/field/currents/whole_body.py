@@ -49,8 +49,7 @@ from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import UNRESOLVED, observers_of
 from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
-from creeping.field.currents.bounce import received
-from creeping.field.currents.radiation import far_of_scalar, field_of_scalar, phase_sums
+from creeping.field.currents.radiation import far_of_scalar, field_of_scalar, phase_sums, received
 from creeping.field.results.far_result import FarField
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.checks import unit_of
