@@ -286,8 +286,9 @@ class _Points:
         currents = self.solved or currents_near(problem, len(at))
         if currents is None:
             return []
-        least = heights_of(problem)[0] if problem.vector else OFF
-        far = currents.solved | far_enough(problem.body, problem.wavenumber, x, least)
+        far = np.ones(len(x), dtype=bool)
+        if not currents.solved:
+            far = far_enough(problem.body, problem.wavenumber, x, heights_of(problem)[0] if problem.vector else OFF)
         if np.any(far):
             pair = currents.total(x[far], self.dark[at[far]])
             by = "equation" if currents.solved else "currents"

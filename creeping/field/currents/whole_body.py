@@ -371,7 +371,7 @@ class SurfaceCurrents:
         return strength, np.asarray(-1j * self.wavenumber * self.boundary.at(self.points).admittance * strength)
 
 
-def far_enough(body: Surface, wavenumber: float, points: FloatArray, least: float = OFF) -> BoolArray:
+def far_enough(body: Surface, wavenumber: float, points: FloatArray, least: float) -> BoolArray:
     """Whether points (n, 3), L, are so far off the body that sums over nodes are integrals: (n,).
 
     ``least`` is the distance asked for, in wavelengths.

@@ -438,12 +438,12 @@ class ConductorTileCurrents(_OnTiles, ConductorCurrents):
         """n.E at the nodes (n, p), in units of the incident E."""
         return np.asarray(self.charges() @ self.mix)
 
-    def charge_on_body(self, points: ArrayLike, J: ComplexArray | None = None) -> tuple[ComplexArray, FloatArray]:
-        """n.E and its error, as `on_body`: (m, p) each; of the current there (m, 3, p) if it is known."""
+    def charge_on_body(self, points: ArrayLike, J: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+        """n.E and its error, as `on_body`: (m, p) each; ``J`` (m, 3, p) is the current there."""
         places = self._places(points)
         assert places.own is not None
         values = self._charge_at(places)
-        unresolved = self._unresolved(places, self.values, self._values_at(places) if J is None else J)
+        unresolved = self._unresolved(places, self.values, J)
         # the potential of what tiles do not resolve of J, which changes sign along the body
         potential = (self.wavenumber * self.matrix.tiles.reach[places.own[0]] * unresolved.T).T
         return values, np.hypot(self._error_on(places, self.charge, values, 1.0), potential)

@@ -214,7 +214,7 @@ def fan_waves(fan: RayFan, *, wavenumber: float, boundary: Boundary) -> FanWaves
     """Marched waves of a fan, made once for each of the last wavenumbers and boundaries."""
 
     def make() -> FanWaves:
-        marched = march_rays(fan_profiles(fan, boundary=boundary), wavenumber=wavenumber, boundary=boundary)
+        marched = march_rays(fan_profiles(fan, boundary), wavenumber=wavenumber, boundary=boundary)
         times = np.linspace(0.0, fan.length, int(np.max(marched.counts, initial=FEWEST)) + 1)
         ends = np.where(np.isin(fan.status, AT_CREASES), fan.detachment, np.inf)
         alone = march_alone(fan.body, boundary)

@@ -74,10 +74,9 @@ LARGEST = 0.5357
 """Largest value of Ai."""
 
 
-def fan_strips(fan: RayFan, *, single: bool = False) -> tuple[Strip, ...]:
-    """Strips of a fan, made once; those of a single ray, which have nothing to interpolate, on request."""
-    strips = memo(fan, "strips", lambda: strips_of(fan))
-    return tuple(strip for strip in strips if single or len(strip.positions) > 1)
+def fan_strips(fan: RayFan) -> tuple[Strip, ...]:
+    """Strips of a fan, made once, but those of a single ray, which have nothing to interpolate."""
+    return memo(fan, "strips", lambda: tuple(strip for strip in strips_of(fan) if len(strip.positions) > 1))
 
 
 def far_geometry(fan: RayFan, observation: ArrayLike) -> "FarGeometry":
