@@ -105,7 +105,7 @@ def near_field(
         elsewhere if they take less than about forty seconds and the order is 2. A body with joints always uses
         currents off its surface. "equation" uses currents from the integral equation (`surface_currents` with
         ``solve=True``). Closer to the body than a quarter of a wavelength the field is interpolated between the
-        currents' field and the field on the body ("layer", see `creeping.field.near`), or taken from rays where the
+        currents' field and the field on the body ("layer", see `creeping.field.layer`), or taken from rays where the
         surface below has no usable field, e.g. in a concave region.
 
     Returns

@@ -118,8 +118,8 @@ def _wide(fan: RayFan, rays: RayPoints, k: float) -> FloatArray:
     return np.asarray(share * np.cbrt(0.5 * k * a))
 
 
-def ray_magnitude(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike = "soft") -> FloatArray:
-    """|u|, or |du/dn|/k of the soft boundary, of each ray at its steps: (rays, steps).
+def ray_envelope(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike) -> ComplexArray:
+    """u, or du/dn/k, of each ray at its steps without the factor e^{ik eikonal}, fast to vary.
 
     Parameters
     ----------
@@ -136,14 +136,6 @@ def ray_magnitude(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike = "s
     ------
     InvalidInputError
         On a bad wavenumber or boundary, and for a weighted body.
-    """
-    return np.abs(ray_envelope(fan, wavenumber=wavenumber, boundary=boundary))
-
-
-def ray_envelope(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike = "soft") -> ComplexArray:
-    """u, or du/dn/k, of each ray at its steps without the factor e^{ik eikonal}, fast to vary: (rays, steps).
-
-    Arguments, errors and what is infinite or 0 as of `ray_magnitude`.
     """
     kind = scalar_boundary(boundary)
     k = checked(wavenumber, 1)
