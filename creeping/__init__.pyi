@@ -9,16 +9,17 @@ from .errors import SurfaceError as SurfaceError
 from .errors import ToleranceError as ToleranceError
 from .field.body_currents import surface_currents as surface_currents
 from .field.boundary import ImpedanceBoundary as ImpedanceBoundary
-from .field.conductor.near import conductor_current as conductor_current
-from .field.conductor.near import conductor_field as conductor_field
 from .field.currents.whole_body import SurfaceCurrents as SurfaceCurrents
 from .field.cut_result import FieldCut as FieldCut
 from .field.cut_result import field_cut as field_cut
 from .field.equation.solution import Solution as Solution
 from .field.equation.solving import solve as solve
 from .field.far import far_field as far_field
+from .field.far import far_field_uncertainty as far_field_uncertainty
 from .field.frequency import wavenumber as wavenumber
+from .field.near import conductor_field as conductor_field
 from .field.near import near_field as near_field
+from .field.on_body import conductor_current as conductor_current
 from .field.on_body import surface_field as surface_field
 from .field.ports.coupling_result import Coupling as Coupling
 from .field.ports.coupling_result import CouplingPaths as CouplingPaths
@@ -46,7 +47,6 @@ from .field.sources import SourcePattern as SourcePattern
 from .field.sources import source_pattern as source_pattern
 from .field.tmatrix.computing import t_matrix as t_matrix
 from .field.tmatrix.result import TMatrix as TMatrix
-from .field.uncertainty import far_field_uncertainty as far_field_uncertainty
 from .field.validity_range import Validity as Validity
 from .field.validity_range import validity as validity
 from .geodesics.direct_flow import DirectFlow as DirectFlow

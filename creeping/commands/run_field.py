@@ -18,10 +18,9 @@ from creeping.field.body_currents import cached_currents
 from creeping.field.boundary import BoundaryLike, parse_boundary
 from creeping.field.equation.solution import Solution
 from creeping.field.equation.solving import solved_alone
-from creeping.field.far import far_in_parts
+from creeping.field.far import far_field_uncertainty, far_in_parts
 from creeping.field.results.comparison import cross_section_decibels
 from creeping.field.results.far_result import FarField, turned_to_azimuth
-from creeping.field.uncertainty import far_field_uncertainty
 from creeping.field.validity_range import validity
 from creeping.field.waves.forward import lobe_step
 from creeping.files.ffe import grid_directions

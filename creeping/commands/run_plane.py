@@ -12,11 +12,10 @@ from creeping._typing import FloatArray
 from creeping.commands.body import Output, write_tables
 from creeping.commands.run_field import DPI, ORDER, Job
 from creeping.errors import InvalidInputError
-from creeping.field.body_currents import affordable
-from creeping.field.conductor.near import conductor_field
 from creeping.field.cut_result import FieldCut, cut_grid, field_cut
 from creeping.field.equation.solution import Solution
-from creeping.field.near import near_field
+from creeping.field.near import conductor_field, near_field
+from creeping.field.routes import affordable
 from creeping.rays.fan import RayFan
 
 PLANES = {"incidence": None, "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}

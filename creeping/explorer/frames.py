@@ -16,11 +16,13 @@ from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.explorer.request import ViewRequest
 from creeping.explorer.wave import RayWave, ray_wave, segments
-from creeping.field.body_currents import affordable, cached_currents, has_expansions
+from creeping.field.body_currents import cached_currents
 from creeping.field.far import far_field
-from creeping.field.on_body import ray_envelope
+from creeping.field.on_rays import ray_envelope
+from creeping.field.problem import has_expansions
 from creeping.field.results.comparison import decibels
 from creeping.field.results.far_result import FarField
+from creeping.field.routes import affordable
 from creeping.field.tmatrix.computing import expected
 from creeping.field.validity_range import Validity, validity
 from creeping.geodesics.equations import natural_horizon

@@ -45,8 +45,8 @@ from creeping.explorer.panel import cut_svg, legend, plane_svg, preview_plane_sv
 from creeping.explorer.request import BOUNDARIES, RAYS, ViewRequest, angles, wave_scale
 from creeping.explorer.scene import DrawnBody, Paint, Scene, turned
 from creeping.explorer.wave import Span, fitted_span
-from creeping.field.body_currents import expected_nodes
 from creeping.field.lit_ground import convex
+from creeping.field.routes import expected_nodes
 from creeping.geometry.evaluators import speed_of
 from creeping.geometry.surface import size
 from creeping.rays.transport import Flow

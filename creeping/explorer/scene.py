@@ -22,7 +22,7 @@ from creeping.explorer.wave import (
     strengths,
     wave_colours,
 )
-from creeping.field.on_body import creeps
+from creeping.field.on_rays import creeps
 from creeping.geometry.piecewise import drawn_mesh
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.triangulation import Triangulation

@@ -1,36 +1,31 @@
 """Currents of the whole body of a fan: by expansions, or by the body's integral equation where these do not serve.
 
 Expansions: nodes of the lit side and of creeping rays (`creeping.field.currents.nodes`), each boundary's waves on them.
-The equation: `creeping.field.equation.solving`. What either costs is reckoned here, and currents are kept with the fan.
+The equation: `creeping.field.equation.solving`. Currents are kept with the fan.
 
 Sources: Derivations, F16 to F18 and F36.
 """
 
 from dataclasses import replace
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from creeping._typing import Any, FloatArray
+from creeping._typing import FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, scalar_boundaries
-from creeping.field.currents.bounce import may_self_reflect, self_reflects
 from creeping.field.currents.conductor import ConductorCurrents, conductor_waves
-from creeping.field.currents.nodes import RAYS, STEPS, LitNodes, lit_nodes, lit_waves, ray_nodes, ray_waves
-from creeping.field.currents.radiation import grid_cells, transformed
-from creeping.field.currents.whole_body import POINTS as POINTS_INSIDE
+from creeping.field.currents.nodes import LitNodes, lit_nodes, lit_waves, ray_nodes, ray_waves
+from creeping.field.currents.radiation import self_reflects
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation import solving
-from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
-from creeping.field.equation.effort import expected_seconds_of, too_much
 from creeping.field.equation.solving import Solved, asked_solution, solution_for
+from creeping.field.problem import has_expansions
 from creeping.geometry.arguments import one_of
-from creeping.geometry.piecewise import has_edges, is_piecewise
-from creeping.geometry.quadrature import node_count
-from creeping.geometry.surface import Surface, size
+from creeping.geometry.memo import memo_of
+from creeping.geometry.piecewise import is_piecewise
+from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
-from creeping.rays.reach import ray_length
 from creeping.shadow.line import ShadowLine
 
 CUT = 1e-3
@@ -38,21 +33,8 @@ CUT = 1e-3
 POOR = 0.01
 """What currents leave of the incident wave inside from which the equation of any body is solved: next to the body they
 err by ten times that."""
-AFFORDABLE = 3e9
-"""Nodes times directions, one by one, up to which "auto" takes currents: some ten seconds of one core."""
-POINTS = 2e10
-"""Nodes times points near the body, likewise: forty seconds."""
-MOST_NODES = 1_500_000
-"""Nodes up to which it does, for the memory's sake."""
-MAKING = 2700.0
-"""What making a node costs, in terms of a place at which it is summed: 9 microseconds."""
-SECONDS = 3.3e-9
-"""Of one node at one place."""
-LIT = 0.6
-"""Share of a body's nodes that are lit or in the penumbra."""
 KEPT = 2
 """Currents kept with a fan, of so many wavenumbers and boundaries."""
-_CURRENTS: "WeakKeyDictionary[RayFan, dict[Any, SurfaceCurrents]]" = WeakKeyDictionary()
 
 
 def surface_currents(
@@ -125,7 +107,7 @@ def surface_currents(
     # both are measured the same way; what expansions leave is not known where the body is too thin for points inside
     if found and not found.currents.extinction > currents.extinction:
         return _of_line(fan, found)
-    if facing and currents.boundary.kind in ("soft", "hard", "conductor"):
+    if facing and currents.bounces:
         currents.values[currents.lit] += currents.reflected_onto(lit.points, lit.normals)
     return currents
 
@@ -146,11 +128,6 @@ def _of_line(fan: RayFan, solved: Solved) -> SurfaceCurrents:
 
 def _unserved(fan: RayFan) -> float:
     return 1.0 - float(fan.line.fractions["attached"])
-
-
-def has_expansions(body: Surface, boundary: BoundaryLike) -> bool:
-    """Whether there are expansions of currents on all of a body: not round edges, nor across joints of a conductor."""
-    return not has_edges(body) and not (boundary == "pec" and is_piecewise(body))
 
 
 def _expanded(fan: RayFan, lit: LitNodes, k: float, kinds: tuple[Boundary, ...]) -> SurfaceCurrents:
@@ -196,50 +173,6 @@ def _rim(line: ShadowLine, wavenumber: float) -> FloatArray:
     return np.concatenate(parts)
 
 
-def affordable(fan: RayFan, places: int, wavenumber: float, *, distant: bool = False) -> bool:
-    """Whether currents cost little enough for so many points, or directions if ``distant``."""
-    nodes = expected_nodes(fan, wavenumber)
-    if nodes > MOST_NODES:
-        return False
-    cells = grid_cells(np.ptp(fan.body.bounds, axis=0), wavenumber)
-    by_transform = distant and transformed(nodes, places, cells)
-    if not distant:
-        return nodes * MAKING < AFFORDABLE and nodes * places < POINTS
-    return nodes * (MAKING + (0 if by_transform else places)) < AFFORDABLE
-
-
-def expected_seconds(fan: RayFan, wavenumbers: FloatArray, directions: int, boundary: BoundaryLike = "soft") -> float:
-    """About what currents of one incidence at wavenumbers (k,), 1/L, and their far field cost, where they are taken."""
-    known = [float(k) for k in wavenumbers if affordable(fan, directions, float(k), distant=True)]
-    plain = SECONDS * sum(expected_nodes(fan, k) * (MAKING + directions) for k in known)
-    solved = _unserved(fan) > CUT or not has_expansions(fan.body, boundary)
-    if not (solved or may_self_reflect(fan.body)):
-        return plain
-    return plain + sum(expected_seconds_of(fan.body, k, boundary) for k in known)
-
-
-def expected_nodes(fan: RayFan, wavenumber: float) -> int:
-    """About how many nodes the currents of a fan's incidence have."""
-    wavelength = 2 * np.pi / wavenumber
-    line = sum(curve.length for curve in fan.line.curves) * fan.line.fractions["attached"]
-    rays = RAYS * STEPS * line * ray_length(fan.line, wavenumber=wavenumber) / wavelength**2
-    return int(LIT * node_count(fan.body, 2 * wavenumber) + rays)
-
-
-def solved_currents(fan: RayFan, wavenumber: float, boundary: BoundaryLike) -> SurfaceCurrents | None:
-    """Currents of the body's integral equation, where `cached_currents` gives these by itself; None elsewhere.
-
-    So fields far, near and on the body go one way. Nothing is made where the equation would cost too much.
-    """
-    if too_much(fan.body, wavenumber, boundary) or not affordable(fan, POINTS_INSIDE, wavenumber):
-        return None
-    try:
-        found = cached_currents(fan, wavenumber, boundary)
-    except (InvalidInputError, SurfaceError):
-        return None
-    return found if isinstance(found, (TileCurrents, ConductorTileCurrents)) else None
-
-
 def cached_currents(
     fan: RayFan, wavenumber: float, boundary: BoundaryLike, *, solve: bool | None = None
 ) -> SurfaceCurrents:
@@ -250,10 +183,8 @@ def cached_currents(
     InvalidInputError, SurfaceError
         As `surface_currents`.
     """
-    kept = _CURRENTS.setdefault(fan, {})
-    key = (wavenumber, boundary, solve)
-    if key not in kept:
-        while len(kept) >= KEPT:
-            kept.pop(next(iter(kept)))
-        kept[key] = surface_currents(fan, wavenumber=wavenumber, boundary=boundary, solve=solve)
-    return kept[key]
+
+    def make() -> SurfaceCurrents:
+        return surface_currents(fan, wavenumber=wavenumber, boundary=boundary, solve=solve)
+
+    return memo_of(fan, "currents", (wavenumber, boundary, solve), make, KEPT)

@@ -18,13 +18,12 @@ from creeping._presenting import Drawn, brief
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import PLAIN, checked, checked_plain
-from creeping.field.body_currents import affordable
 from creeping.field.boundary import BoundaryLike
-from creeping.field.conductor.near import VECTOR, conductor_field
 from creeping.field.equation.solution import Solution
-from creeping.field.near import near_field
+from creeping.field.near import conductor_field, near_field
 from creeping.field.results.conductor_result import ConductorField
 from creeping.field.results.point_result import FieldStatus, NearField
+from creeping.field.routes import TRUST, affordable
 from creeping.geometry.arguments import number_between, one_of, positive_number, real_array
 from creeping.geometry.directions import unit_direction
 from creeping.geometry.parts import inside
@@ -407,7 +406,7 @@ def _checked(
     k = checked(wavenumber, order, fan.body)
     if conductor and (order != 2 or method not in PLAIN):
         raise InvalidInputError("a conductor's field has order 2 and method 'auto' or 'equation'")
-    return k, VECTOR if conductor else 1.0
+    return k, TRUST.vector if conductor else 1.0
 
 
 def _axes(direction: FloatArray, across: ArrayLike | None, up: ArrayLike | None, box: FloatArray) -> FloatArray:

@@ -16,7 +16,9 @@ epsilon, in directions spread over the sphere. With e the error that rays state 
 e falls as fast as the order that it is of; of a conductor, whose second order is a rule away from the sphere, a level
 above 1 tells of a term of first order, and grows like k. The second term is what rays and currents both lack.
 
-Sources: [LK59], [CK13]; Derivations, F10 to F17 and F17.
+Also here: how uncertain a far field is because its body is known only approximately.
+
+Sources: [LK59], [CK13]; Derivations, F10 to F17.
 """
 
 # help() shows names of types instead of what they stand for
@@ -29,21 +31,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from creeping._typing import ArrayLike
+from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import SurfaceError
 from creeping.field.arguments import checked, checked_method, checked_plain, observers_of
-from creeping.field.body_currents import (
-    affordable,
-    cached_currents,
-    expected_nodes,
-    has_expansions,
-    solution_of_pieces,
-    surface_currents,
-)
+from creeping.field.body_currents import surface_currents
 from creeping.field.boundary import BoundaryLike, scalar_boundaries
-from creeping.field.currents.far_sum import far_by_currents
-from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.field.currents.whole_body import far_by_currents
+from creeping.field.problem import Problem
 from creeping.field.results.far_result import FarField
+from creeping.field.routes import TRUST, expected_nodes, far_currents
 from creeping.field.validity_range import validity
 from creeping.field.waves.far_geometry import far_geometry
 from creeping.field.waves.far_rays import field_of
@@ -55,6 +51,7 @@ from creeping.geometry.memo import memo
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
+from creeping.rays.uncertain_body import coarse_factor, coarse_fan
 from creeping.storage.memory import blocks, within_budget
 from creeping.storage.parts import Keeping, not_kept
 
@@ -64,12 +61,6 @@ directions before is kept; and for each k size, the fan integral."""
 
 TOGETHER = 1024
 """Directions by rays that are kept at a time: some seconds of work."""
-NODES = 50_000
-"""Nodes of the currents that rays are compared with: some tenths of a second."""
-DIRECTIONS = 200
-"""Directions of the comparison."""
-LEVELS = (0.2, 50.0)
-"""Least and largest level that is believed: beyond, what errs at k0 is not what errs at k."""
 
 
 def far_field(
@@ -143,28 +134,12 @@ def far_in_parts(
     """The same, what is ready of it given to ``keep``: ``rays-`` of some directions after the other, or sums."""
     one_of(fan, "fan", RayFan, "creeping.launch")
     checked_plain(fan.body)
-    kinds = scalar_boundaries(boundary)
+    scalar_boundaries(boundary)
     k = checked(wavenumber, order, fan.body)
     checked_method(method, order)
     r = observers_of(observation)
-    piecewise, solve = is_piecewise(fan.body), True if method == "equation" else None
-    serve = has_expansions(fan.body, boundary) and (order == 2 or not piecewise)
-    auto = method == "auto" and order == 2 and len(r) > 0
-    # a conductor's sums are of six columns, those of one scalar problem of one to four
-    cheap = serve and auto and affordable(fan, len(kinds) * len(r), k, distant=True)
-    # there are no modes of an admittance that varies
-    must = solve or (serve and (method == "currents" or (method == "auto" and kinds[0].varies and not piecewise)))
-    currents: SurfaceCurrents | None = None
-    if auto and piecewise:
-        # edges diffract, and currents go across joints: the equation alone knows how
-        solved = solution_of_pieces(fan, k, boundary)
-        currents = solved.currents if solved else None
-    if not currents and (must or cheap):
-        try:
-            currents = cached_currents(fan, k, boundary, solve=solve)
-        except SurfaceError:
-            if must:
-                raise
+    piecewise = is_piecewise(fan.body)
+    currents = far_currents(Problem(fan, k, boundary, order, method), len(r))
     if currents:
         # the equation knows of tips, expansions do not
         left_out = tip_waves(fan, k) if piecewise and not currents.solved else 0.0
@@ -184,6 +159,7 @@ def far_in_parts(
 
     far = FarField.joined([_kept(keep, f"rays-{some.start}", partial(some_of, some)) for some in parts])
     far = replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
+    auto = method == "auto" and order == 2 and len(r) > 0
     level = measured_level(fan, k, boundary) if auto else None
     return level.applied(far) if level else far
 
@@ -247,7 +223,7 @@ def measured_level(fan: RayFan, wavenumber: float, boundary: BoundaryLike) -> Le
     # whatever the wavenumber, so that many have the comparison in common
     highest = 100 / size(fan.body)
     for _ in range(3):
-        highest *= np.sqrt(NODES / max(expected_nodes(fan, highest), 1))
+        highest *= np.sqrt(TRUST.level_nodes / max(expected_nodes(fan, highest), 1))
     k0 = min(wavenumber, float(highest))
     return memo(fan, f"level {boundary} {k0!r}", lambda: _measured(fan, k0, boundary))
 
@@ -258,7 +234,7 @@ def _measured(fan: RayFan, k0: float, boundary: BoundaryLike) -> Level | None:
         currents = surface_currents(fan, wavenumber=k0, boundary=boundary, solve=False)
     except SurfaceError:
         return None
-    r = fibonacci_directions(DIRECTIONS)
+    r = fibonacci_directions(TRUST.level_directions)
     geometry = far_geometry(fan, r)
     rays = field_of(geometry, k0, boundary, 2)
     off = np.abs(rays.total - currents.far(r))
@@ -268,5 +244,55 @@ def _measured(fan: RayFan, k0: float, boundary: BoundaryLike) -> Level | None:
     shared = currents.extinction * currents.mean_amplitude
     if not len(ratio) or not np.isfinite(shared):
         return None
-    factor = float(np.clip(np.quantile(ratio, 0.95), *LEVELS))
+    factor = float(np.clip(np.quantile(ratio, 0.95), *TRUST.levels))
     return Level(k0, factor, float(shared), currents.unserved)
+
+
+def far_field_uncertainty(
+    fan: RayFan, observation: ArrayLike, *, wavenumber: float, boundary: BoundaryLike = "soft", order: int = 2
+) -> FloatArray | None:
+    """Change of the far field when the body is replaced by its second fit (`coarse_fit`).
+
+    Shadow line and rays are computed again on the second fit. The change is about the error of the less accurate fit.
+    Where the second fit uses a coarser grid that resolves the body, it is two to four times the error of the fan's
+    field. For a subdivided mesh it is multiplied by ``coarse_factor`` and is about the error of the fan's field. The
+    error of the asymptotic method is not included.
+
+    Parameters
+    ----------
+    fan : RayFan
+        Of a body from a file; see `creeping.rays.uncertain_body`.
+    observation, wavenumber, boundary, order
+        As for `far_field`.
+
+    Returns
+    -------
+    (m,) or (m, 2, 2), L, or None
+        |f - f on the second fit| times ``coarse_factor``; None for a body that is known exactly.
+
+    Raises
+    ------
+    InvalidInputError
+        For the reasons given at `far_field`.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> fan = cr.launch(cr.DirectFlow(ball), cr.shadow_line(ball, direction=(0, 0, 1)), length=0.5, n_rays=8)
+    >>> cr.far_field_uncertainty(fan, [(0, 0, -1)], wavenumber=30.0) is None    # a sphere is known exactly
+    True
+    """
+    one_of(fan, "fan", RayFan, "creeping.launch")
+    checked_plain(fan.body)
+    scalar_boundaries(boundary)
+    checked(wavenumber, order)
+    observers_of(observation)
+    other = coarse_fan(fan)
+    if other is None:
+        return None
+    mine, its = (
+        far_field(one, observation, wavenumber=wavenumber, boundary=boundary, order=order) for one in (fan, other)
+    )
+    return coarse_factor(fan) * np.abs(mine.total - its.total)

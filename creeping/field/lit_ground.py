@@ -16,14 +16,15 @@ Sources: [F46], [LK59]; Derivations, F16 and F20. The factors were set on four b
 """
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
 from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import fock_scale
-from creeping.field.currents.bounce import may_self_reflect
 from creeping.field.currents.nodes import LitNodes
+from creeping.field.currents.radiation import may_self_reflect
 from creeping.field.results.point_result import FieldStatus, PointValues, Words
 from creeping.field.waves.ray_sums import RaySum
 from creeping.geometry.piecewise import is_piecewise
@@ -31,25 +32,41 @@ from creeping.geometry.surface import size
 from creeping.rays.fan import RayFan
 from creeping.rays.status import RayStatus
 
-SQUARED = {"soft": 0.7, "hard": 2.0, "impedance": 0.6, "conductor": 2.0}
-"""Factor A of the error on the lit side, by boundary."""
-LEAST = {"soft": 0.02, "hard": 0.02, "impedance": 0.05, "conductor": 0.25}
-"""B."""
-FADES = {"soft": 0.0, "hard": 0.0, "impedance": 0.0, "conductor": 1.0}
-"""G: what the second order leaves out of a conductor's currents is most where the wave grazes."""
-VARIES = {"soft": 0.02, "hard": 0.02, "impedance": 0.06, "conductor": 0.05}
-"""C; an impedance leaves curvature that varies out of its second order."""
+
+class LitFactors(NamedTuple):
+    """Factors of the error of a boundary's lit side.
+
+    Attributes
+    ----------
+    squared, least, varies, across : float
+        A to D; an impedance leaves curvature that varies out of its second order.
+    fades : float
+        G: what the second order leaves out of a conductor's currents is most where the wave grazes.
+    afar : float
+        The factor of what currents leave inside on the dark side, where waves are marched beyond the end of rays.
+    """
+
+    squared: float
+    least: float
+    varies: float
+    across: float
+    fades: float
+    afar: float
+
+
+FACTORS = {
+    "soft": LitFactors(0.7, 0.02, 0.02, 0.05, 0.0, 1.5),
+    "hard": LitFactors(2.0, 0.02, 0.02, 0.05, 0.0, 2.5),
+    "impedance": LitFactors(0.6, 0.05, 0.06, 0.15, 0.0, 2.0),
+    "conductor": LitFactors(2.0, 0.25, 0.05, 0.3, 1.0, 2.5),
+}
 COATED = 1.5
 """By how much more an admittance that varies is off."""
-ACROSS = {"soft": 0.05, "hard": 0.05, "impedance": 0.15, "conductor": 0.3}
-"""D."""
 FLAT, ENDS = 2.0, 0.7
 """1/(kappa_a a) from which ground is flat, and factor F of what the curvature at its end is worth."""
 LEFT, UNKNOWN = 2.0, 2.0
 """Factor of what currents leave inside, of waves that come to the lit side from elsewhere; and their bound, a
 reflected wave and its image."""
-AFAR = {"soft": 1.5, "hard": 2.5, "impedance": 2.0, "conductor": 2.5}
-"""The factor on the dark side where waves are marched beyond the end of rays."""
 WELL_KNOWN = 0.04
 """What currents of a conductor leave at most where that tells of the dark side; beyond, the factor grows with it."""
 
@@ -86,7 +103,7 @@ def composed(
     unknown = (share > 0) & (not np.isfinite(left))
     lit_off = np.hypot(lit_off, share * unit * (LEFT * left if np.isfinite(left) else UNKNOWN))
     # where rays have ended the march goes on, but waves from elsewhere come to the dark side as well
-    afar, dark = AFAR[kind.kind], 1 - share
+    afar, dark = FACTORS[kind.kind].afar, 1 - share
     if kind.kind == "conductor":
         # such waves come to the penumbra as they do beyond it
         afar, dark = afar * max(1.0, left / WELL_KNOWN), np.where(share < 1, 1.0, 0.0)
@@ -138,15 +155,15 @@ def lit_error(
 
     The body is of size ``extent``, L.
     """
-    m = fock_scale(k, part.along)
+    m, of = fock_scale(k, part.along), FACTORS[kind.kind]
     # grazing a flat or concave place m is infinite, and optics alone stands there
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         across = np.nan_to_num(np.abs(part.across / part.along) / m**2, posinf=0.0)
         terms = (
-            SQUARED[kind.kind] * (change / np.maximum(size, 1e-300)) ** 2,
-            LEAST[kind.kind] / m**4 / (1 + FADES[kind.kind] * (np.minimum(m, 1e9) * part.cosine) ** 2),
-            VARIES[kind.kind] * (np.abs(part.bend) + part.rate**2) / m**2,
-            ACROSS[kind.kind] * across * (m**-2 if kind.kind == "conductor" else across),
+            of.squared * (change / np.maximum(size, 1e-300)) ** 2,
+            of.least / m**4 / (1 + of.fades * (np.minimum(m, 1e9) * part.cosine) ** 2),
+            of.varies * (np.abs(part.bend) + part.rate**2) / m**2,
+            of.across * across * (m**-2 if kind.kind == "conductor" else across),
             _flat_error(part, k, extent),
         )
     share = np.linalg.norm(terms, axis=0) * (COATED if kind.varies else 1.0)

@@ -1,73 +1,69 @@
-"""The field on the body: u, or du/dn where u = 0, of creeping rays in the shadow, of the wave itself on the lit side.
+"""The field on the body: u, or du/dn where u = 0, or J and n.E of a conductor, lit or in the shadow.
 
-    u = (1 - W) e^{ikd.x} u_lit + sum_rays w_i u_i,   W = W(xi; 0, 0.6),   w_i = W for rays that have just left the line
+    u = (1 - W) u_lit + sum_rays w_i u_i,   W = W(xi; 0, 0.6),   w_i = W for rays that have just left the line
 
-with u_lit the lit side's expansion (`creeping.field.currents.lit`), which holds to a little beyond the line, and 1 for
-w_i of rays that come from afar. `creeping.field.lit_ground` says how far it is off. On a body that may reflect onto
-itself, hides part of its line, or has edges, joints or tips, or if it is asked for, the solution of the integral
-equation stands for both, where it is affordable (`creeping.field.equation`).
+with u_lit the lit side's expansion (`creeping.field.currents.lit`), which holds to a little beyond the line, and what
+that side receives from other parts of the body (`creeping.field.currents.radiation`); w_i is 1 for rays that come from
+afar. Waves along rays are marched, with beams where rays merge (`creeping.field.marching.fan_waves`), or are creeping
+modes where the march is impossible or would take too long. `creeping.field.lit_ground` says how far it is off. On a
+body that may reflect onto itself, hides part of its line, or has edges, joints or tips, or if it is asked for, the
+solution of the integral equation stands for all of it, where it is affordable (`creeping.field.equation`).
 
-Also here: each ray's own wave on the body, along the whole of a fan: by creeping modes, and by marching where these
-have none.
+Of a conductor all of this is of J = n x H, of each polarisation, and
 
-Modes end where a ray detaches, at joints, and where an admittance varies; the marched wave, of a plane wave alone,
+    n.E = div J/(ik),   dH_n/dn = -div (J x n),   div v = sum_t t.[v(x + h t) - v(x - h t)]/2h,   kh = CLOSE
 
-    u = y |J|^(-1/2) e^{ik(d.x0 + s) - i pi N/2}
+with two tangents t at x. The charge of expansions has the error of J in both of its slopes. Errors are those of scalar
+fields, |J| in place of |u|; what comes to the lit side later is taken to be as much as what comes there at first.
 
-goes on (`creeping.field.marching.fan_waves`). On a caustic either is infinite.
-
-Also here: each ray's own field from what the fan carries already; for pictures that follow a hand.
-
-First order of `creeping.field.waves.surface`, with ξ = (k/2)^(1/3) A and A the fan's attenuation integral:
-
-    u e^{-ik(d.x0 + s)} = (ρ1/ρ2)^(1/6) |J|^(-1/2) e^{-iπN/2} g(ξ)          hard, impedance
-    du/dn/k: the same with F(ξ)/m2                                          soft
-
-Sources: [F46], [LK59]; Derivations, F9, F16, F20, F22 and F3.
+Sources: [F46], [LK59]; [CK13, sec. 6.2], [P82]; Derivations, F9, F16, F18, F20, F22, F24 and F26.
 """
 
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from creeping._typing import ArrayLike, BoolArray, ComplexArray, FloatArray
-from creeping.errors import InvalidInputError, SurfaceError
-from creeping.field.arguments import PLAIN, checked, checked_method, checked_plain, fock_parameter, scales
-from creeping.field.body_currents import affordable, cached_currents, solved_currents
-from creeping.field.boundary import Boundary, BoundaryLike, ImpedanceBoundary, boundary_name
-from creeping.field.creeping_modes import fock_scale
-from creeping.field.currents.nodes import TAKEN_OVER, lit_part, lit_waves
-from creeping.field.currents.whole_body import POINTS as INNER
+from creeping._typing import ArrayLike, ComplexArray, FloatArray
+from creeping.errors import InvalidInputError
+from creeping.field.arguments import PLAIN, checked_plain, fock_parameter
+from creeping.field.boundary import ELECTRIC_HARD, SOFT, BoundaryLike
+from creeping.field.currents.conductor import ConductorWaves, lit_vectors, ray_vectors
+from creeping.field.currents.nodes import TAKEN_OVER, axes_of_incidence, lit_part, lit_waves
 from creeping.field.currents.whole_body import SurfaceCurrents
-from creeping.field.equation.currents import TileCurrents
-from creeping.field.lit_ground import composed, convex, lit_error, without_tips
-from creeping.field.marching.fan_waves import fan_waves, march_alone, marchable, marched_sum, marches, spread_out
-from creeping.field.results.point_result import FieldStatus, PointValues, SurfaceField, Words, judged, measured_field
-from creeping.field.special.fock import surface_function
-from creeping.field.validity_range import validity
+from creeping.field.equation.currents import ON_BODY, ConductorTileCurrents, TileCurrents, along_body
+from creeping.field.lit_ground import composed, lit_error, without_tips
+from creeping.field.marching.fan_waves import fan_waves, march_alone, marched_sums, scalar_on_rays
+from creeping.field.on_rays import own_waves
+from creeping.field.problem import Problem
+from creeping.field.results.conductor_result import ConductorCurrent, vector_on_body
+from creeping.field.results.point_result import (
+    FieldStatus,
+    PointValues,
+    SurfaceField,
+    Words,
+    columns_of,
+    measured_field,
+    scalar_on_body,
+)
+from creeping.field.routes import currents_behind, left_behind, marches, stands_alone
+from creeping.field.waves.beams import wide
 from creeping.field.waves.far_geometry import fan_strips
-from creeping.field.waves.gaussian_beams import beam_length
-from creeping.field.waves.ray_sums import NARROW_ALONE, RaySum, own_error, ray_sum, tube_share
-from creeping.field.waves.surface import scalar_boundary, surface_waves
+from creeping.field.waves.ray_sums import RaySum, own_error, ray_sum, total_of
+from creeping.field.waves.surface import surface_waves
 from creeping.geodesics.bundle import as_points, on_body
-from creeping.geometry.arguments import one_of
-from creeping.geometry.checks import unit_of
-from creeping.geometry.incident import PointSource, plane_direction
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.quadrature import nodes_at
-from creeping.geometry.surface import normal, size
+from creeping.geometry.surface import Surface, normal, project, size
 from creeping.rays.fan import RayFan
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import shed_on
-from creeping.rays.strips import ray_points
 
-SCALAR: dict[str, BoundaryLike] = {"soft": "soft", "hard": "hard"}
-
-QUARTERS = np.array([1.0, -1j, -1.0, 1j])
-"""e^{-iπN/2}."""
+CLOSE = 0.02
+"""kh: expansions are smooth to rounding."""
 
 
 def surface_field(
@@ -127,268 +123,274 @@ def surface_field(
     >>> np.abs(u).round(1).tolist(), u.method.tolist(), bool(u.error.max() < 0.05)
     ([2.0, 0.5], ['lit', 'march'], True)
     """
-    one_of(fan, "fan", RayFan, "creeping.launch")
-    checked_plain(fan.body)
-    kind = scalar_boundary(boundary)
-    k = checked(wavenumber, order, fan.body)
-    checked_method(method, order, PLAIN)
+    problem = Problem.scalar(fan, wavenumber, boundary, order, method, PLAIN)
     if points is None:
         if method == "equation":
             raise InvalidInputError("method 'equation' is of the field at points, not of each ray's own; give points")
-        return own_waves(fan, k, boundary, kind, order)
+        return own_waves(problem)
     y = as_points(points)
-    shape = y.shape[:-1]
-    on = on_body(fan.body, y).reshape(-1, 3)
-    solved = cached_currents(fan, k, boundary, solve=True) if method == "equation" else None
-    total = total_on(fan, on, k, kind, order, solved)
-    status = judged(total.status, total.values, total.error, total.error_by, k if kind.kind == "soft" else 1.0)
-    return SurfaceField(
-        points=y.copy(),
-        values=total.values.reshape(shape),
-        error=total.error.reshape(shape),
-        error_by=total.error_by.reshape(shape),
-        status=status.reshape(shape),
-        method=total.method.reshape(shape),
-        lit=total.wave.reshape(shape),
-        creeping=total.creeping.reshape(shape),
-        wavenumber=k,
-        boundary=boundary_name(boundary),
-        order=order,
-        validity=validity(fan, wavenumber=k),
-        length_unit=unit_of(fan.body),
-    )
+    x = on_body(fan.body, y).reshape(-1, 3)
+    found = field_on_body(problem, x, currents_behind(problem))
+    return scalar_on_body(found.columns[0], y, problem.unit, problem.facts())
 
 
-def rays_on(
-    fan: RayFan, points: FloatArray, k: float, kind: Boundary, order: int, share: FloatArray | None = None
-) -> tuple[RaySum, Words]:
-    """Creeping waves at points of the body (n, 3), and the method: the march where it is possible, else modes.
-
-    ``share`` (n,) is that of rays that have just left the line.
-    """
-    marched = marches(fan, kind, order, len(points), k)
-    if march_alone(fan.body, kind) and not marched:
-        nothing = np.zeros(len(points))
-        none = RaySum(nothing.astype(complex), nothing, np.full(len(points), int(FieldStatus.NO_RAY)), nothing)
-        return none, np.full(len(points), "none")
-    found = shed_on(fan_strips(fan), fan.body, points)
-    young = np.zeros(len(found.observer), dtype=bool)
-    if share is not None:
-        young = fock_parameter(found.rays, k) < TAKEN_OVER
-    if marched:
-        return marched_sum(fan, found, points, share, young, k, kind), np.full(len(points), "march")
-    waves, other = (surface_waves(found.rays, k, kind, o) for o in (order, 3 - order))
-    if share is not None:
-        weight = np.where(young, share[found.observer], 1.0)
-        # a wave may be infinite
-        waves, other = (np.where(weight > 0, wave * np.where(weight > 0, weight, 1.0), 0.0) for wave in (waves, other))
-    error = own_error(found.rays, (waves, other), k, kind, order)
-    return ray_sum(fan, found, len(points), waves, error, k, kind), np.full(len(points), "rays")
-
-
-def total_on(
+def conductor_current(
     fan: RayFan,
-    points: FloatArray,
-    k: float,
-    kind: Boundary,
-    order: int,
-    currents: SurfaceCurrents | None = None,
-) -> PointValues:
-    """Total field at points of the body (n, 3).
-
-    ``currents`` are those of the wavenumber and boundary, if they are at hand.
-    """
-    jointed, unit = is_piecewise(fan.body), k if kind.kind == "soft" else 1.0
-    # an admittance that steps is smeared by expansions, of which their currents tell
-    alone = not jointed and convex(fan) and not kind.varies
-    if not currents:
-        currents = solved_currents(fan, k, _boundary_of(kind)) if alone else _currents_of(fan, k, kind)
-    if isinstance(currents, TileCurrents) and order == 2:
-        return _solved_on(currents, points)
-    checked_plain(fan.body, edgeless="the field at points of the body")
-    currents = None if alone else currents
-    lit = _lit_at(fan, points, k, kind, order)
-    rays, by = rays_on(fan, points, k, kind, order, 1 - lit[2])
-    left = currents.extinction if currents else 0.0 if alone else np.nan
-    if currents and order == 2 and kind.kind in ("soft", "hard") and not jointed:
-        thrown = currents.reflected_onto(points, normal(fan.body, points))
-        # as much may come later, to and fro, and to the dark side, whose rays do not know of it
-        lit = lit[0] + lit[2] * thrown, np.hypot(lit[1], np.abs(thrown)), lit[2]
-    field = composed(fan, lit, rays, by, left, k, kind, unit)
-    return without_tips(field) if jointed else field
-
-
-def _solved_on(currents: TileCurrents, points: FloatArray) -> PointValues:
-    """Total field of solved currents at points of the body (n, 3)."""
-    found = currents.on_body(points)
-    field = measured_field(found.values, found.error, "equation", "extinction")
-    return replace(field, wave=np.where(found.lit, found.values, 0.0), creeping=np.where(found.lit, 0.0, found.values))
-
-
-def _currents_of(fan: RayFan, k: float, kind: Boundary) -> SurfaceCurrents | None:
-    """Currents of the whole body; None if they cost too much or there is no mesh for them."""
-    try:
-        # as many points as they are judged at
-        return cached_currents(fan, k, _boundary_of(kind)) if affordable(fan, INNER, k) else None
-    except (InvalidInputError, SurfaceError):
-        return None
-
-
-def _boundary_of(kind: Boundary) -> BoundaryLike:
-    impedance = kind.kind == "impedance"
-    return ImpedanceBoundary(kind.coating or kind.admittance) if impedance else SCALAR[kind.kind]
-
-
-def _lit_at(
-    fan: RayFan, points: FloatArray, k: float, kind: Boundary, order: int
-) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    """The lit side's part of the field at points of the body (n, 3), its error, and its share: (n,) each."""
-    body, d = fan.body, fan.line.direction
-    at, part = lit_part(body, fan.line, nodes_at(body, points, normal(body, points)), k)
-    u, other = lit_waves(part, d, size(body), k, kind)[:: 1 if order == 2 else -1]
-    values, error, share = np.zeros(len(points), dtype=complex), np.zeros(len(points)), np.zeros(len(points))
-    share[at] = part.weights
-    values[at] = part.weights * u
-    error[at] = part.weights * lit_error(part, np.abs(u), np.abs(u - other), k, kind, order, size(body))
-    return values, error, share
-
-
-def own_waves(fan: RayFan, k: float, boundary: BoundaryLike, kind: Boundary, order: int) -> SurfaceField:
-    """Each ray's own contribution at the times of a fan (rays, steps).
-
-    Raises
-    ------
-    InvalidInputError
-        If nothing but marching knows the wave, and these rays cannot be marched, or the order is 1.
-    """
-    rays, launched = ray_points(fan, fan.travel_time)[1], fan.launched[:, None]
-    shape = rays.time.shape
-    alone, sphere = march_alone(fan.body, kind), isinstance(fan.line.source, PointSource)
-    if alone:
-        plane_direction(fan.line.source, "a wave that is marched")
-    marches = not sphere and marchable(fan, kind, order, fewest=2)
-    if alone and not marches:
-        raise InvalidInputError(
-            "beyond joints, and where an admittance varies, rays are marched, to second order: give order=2, and a fan "
-            f"with more rays on each arc of the shadow line than this one, which has {len(fan.status)} in all"
-        )
-    by_modes = rays.alive & ~np.full(shape, alone)
-    values, error, wide = _by_modes(rays, by_modes, k, kind, order)
-    method = np.full(shape, "rays", dtype="<U5")
-    beyond = launched & ~by_modes
-    if np.any(beyond) and marches:
-        marched, off = _by_marching(fan, rays, k, kind)
-        known = beyond & np.isfinite(off) & (off < np.abs(marched))
-        values[known], error[known], method[known] = marched[known], off[known], "march"
-        wide[known] = _wide(fan, rays, k)[known]
-        beyond &= ~known
-    status = np.select(
-        [np.broadcast_to(~launched, shape), beyond, wide < NARROW_ALONE],
-        [FieldStatus.NO_RAY, FieldStatus.DETACHED, FieldStatus.CAUSTIC],
-        FieldStatus.OK,
-    )
-    ok = status == FieldStatus.OK
-    unit = k if kind.kind == "soft" else 1.0
-    error = np.where(ok, error, np.where(np.abs(values) > 0, np.abs(values), unit))
-    error_by = np.where(ok, "expansion", "bound")
-    return SurfaceField(
-        points=rays.points.copy(),
-        values=values,
-        error=error,
-        error_by=error_by,
-        status=judged(status, values, error, error_by, unit),
-        method=method,
-        lit=np.zeros(shape, dtype=complex),
-        creeping=values,
-        wavenumber=k,
-        boundary=boundary_name(boundary),
-        order=order,
-        validity=validity(fan, wavenumber=k),
-        length_unit=unit_of(fan.body),
-    )
-
-
-def _by_modes(
-    rays: RayPoints, there: BoolArray, k: float, kind: Boundary, order: int
-) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    """Waves, their errors, and how clear of caustics they are, m |T|/(|J| + rho |J'|): (rays, steps) each."""
-    values, error, wide = np.zeros(there.shape, dtype=complex), np.zeros(there.shape), np.full(there.shape, np.inf)
-    if not np.any(there):
-        return values, error, wide
-    some = rays[there]
-    waves, other = (surface_waves(some, k, kind, o) for o in (order, 3 - order))
-    values[there], error[there] = waves, own_error(some, (waves, other), k, kind, order)
-    with np.errstate(invalid="ignore"):
-        wide[there] = tube_share(some, np.zeros(waves.shape)) * scales(some, k)[1]
-    return values, error, wide
-
-
-def _by_marching(fan: RayFan, rays: RayPoints, k: float, kind: Boundary) -> tuple[ComplexArray, FloatArray]:
-    """Waves and their errors (rays, steps), infinite where there is no wave."""
-    shape = rays.time.shape
-    ray = np.repeat(np.arange(shape[0]), shape[1])
-    y, off = fan_waves(fan, wavenumber=k, boundary=kind).along(ray, rays.time.ravel())
-    with np.errstate(divide="ignore", invalid="ignore"):
-        error = off.reshape(shape) / np.sqrt(np.abs(rays.spreading))
-    return spread_out(y.reshape(shape), rays, k), error
-
-
-def _wide(fan: RayFan, rays: RayPoints, k: float) -> FloatArray:
-    """The same measure (rays, steps) where the ground need not be convex, in terms of the body's size."""
-    a = beam_length(fan.body)
-    share = np.abs(rays.spreading) / (np.abs(rays.spreading) + a * np.abs(rays.spreading_rate))
-    return np.asarray(share * np.cbrt(0.5 * k * a))
-
-
-def ray_magnitude(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike = "soft") -> FloatArray:
-    """|u|, or |du/dn|/k of the soft boundary, of each ray at its steps: (rays, steps).
+    points: ArrayLike,
+    *,
+    wavenumber: float,
+    polarisation: str | ArrayLike | None = None,
+    method: str = "auto",
+) -> ConductorCurrent:
+    """Current J = n x H and charge n.E at points of a perfect conductor, and their errors.
 
     Parameters
     ----------
     fan : RayFan
+    points : (..., 3), L
+        Points on the body, lit or in the shadow.
     wavenumber : float, 1/L
-    boundary : "soft", "hard" or ImpedanceBoundary
+    polarisation : "theta", "phi" or (3,) complex, optional
+        E0 of the incident wave, transverse and of any length; by default both theta and phi.
+    method : {"auto", "equation"}
+        As for `conductor_field`.
 
     Returns
     -------
-    (rays, steps)
-        Infinite at caustics, 0 where the creeping ray has ended.
+    ConductorCurrent
+        J in units of the incident H, the charge in units of the incident E; usable as the array of J.
 
     Raises
     ------
     InvalidInputError
-        On a bad wavenumber or boundary, and for a weighted body.
+        On points off the body or not finite, a bad wavenumber, polarisation or method, for a weighted body, or if the
+        equation is needed (method="equation", or a body with edges or joints) and cannot be solved.
+    SurfaceError
+        If the equation has to be solved and the wavenumber is too high for any mesh of the body.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> ball = sc.Sphere()
+    >>> line = cr.shadow_line(ball, direction=(0, 0, 1))
+    >>> fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=4.0, n_rays=24)
+    >>> J = cr.conductor_current(fan, [(0, 1, 0), (1, 0, 0)], wavenumber=30.0, polarisation=(1, 0, 0))
+    >>> np.linalg.norm(J, axis=1).round(1).tolist(), np.abs(J.charge).round(1).tolist()   # E across n, and along it
+    ([0.3, 1.4], [0.0, 1.5])
     """
-    return np.abs(ray_envelope(fan, wavenumber=wavenumber, boundary=boundary))
+    problem = Problem.conductor(fan, wavenumber, polarisation, method)
+    y, single = as_points(points), polarisation is not None
+    x = on_body(fan.body, y).reshape(-1, 3)
+    found = field_on_body(problem, x, currents_behind(problem))
+    facts = problem.facts() | {"incident_electric": problem.electric[:, 0] if single else problem.electric}
+    return vector_on_body(found.columns, (found.charge, found.charge_error), y, facts, single=single)
 
 
-def ray_envelope(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike = "soft") -> ComplexArray:
-    """u, or du/dn/k, of each ray at its steps without the factor e^{ik eikonal}, fast to vary: (rays, steps).
+class OnBody(NamedTuple):
+    """What is on the body at points (n,).
 
-    Arguments, errors and what is infinite or 0 as of `ray_magnitude`.
+    Attributes
+    ----------
+    columns : list of PointValues
+        u or du/dn (n,), or J (n, 3) of each polarisation.
+    charge : (n, p) complex
+        n.E of a conductor, in units of the incident E.
+    charge_error : (n, p)
+    slope : (n, p) complex
+        (1/k) dH_n/dn of a conductor's expansions, whose error is that of J.
     """
-    kind = scalar_boundary(boundary)
-    k = checked(wavenumber, 1)
-    checked_plain(fan.body)
-    plane_direction(fan.line.source, "this magnitude")
-    out = np.zeros(fan.spreading.shape, dtype=complex)
-    here = creeps(fan)
-    first = np.broadcast_to(fan.curvature[:, :1], here.shape)[here]
-    last = fan.curvature[here]
-    m = fock_scale(k, np.sqrt(first * last))
-    wave = surface_function(np.cbrt(k / 2) * fan.attenuation[here], kind.q(m))
-    with np.errstate(divide="ignore"):
-        strength = np.cbrt(np.sqrt(last / first)) / np.sqrt(np.abs(fan.spreading[here]))
-    if kind.kind == "soft":
-        strength = strength / fock_scale(k, last)
-    finite = np.isfinite(strength)
-    turned = wave * QUARTERS[fan.caustic_index[here] % 4]
-    # inf times a complex number would be NaN
-    out[here] = np.where(finite, turned * np.where(finite, strength, 0.0), np.inf)
-    return out
+
+    columns: list[PointValues]
+    charge: ComplexArray = np.zeros((0, 0), dtype=complex)
+    charge_error: FloatArray = np.zeros((0, 0))
+    slope: ComplexArray = np.zeros((0, 0), dtype=complex)
 
 
-def creeps(fan: RayFan) -> BoolArray:
-    """Whether each ray is a creeping ray at its steps: launched by the wave and not detached before (rays, steps)."""
-    launched = fan.launched
-    return np.asarray(launched[:, None] & (fan.travel_time < fan.detachment[:, None]) & (fan.curvature > 0))
+class Crosses(NamedTuple):
+    """Points (n,) of a body and those to either side of them, in blocks of n: the points first.
+
+    Attributes
+    ----------
+    points, normals : (5 n, 3), L and 1
+    apart : (2, n, 3), L
+        What the two points along each tangent are apart.
+    """
+
+    points: FloatArray
+    normals: FloatArray
+    apart: FloatArray
+
+    def divergence(self, values: ComplexArray) -> ComplexArray:
+        """Divergence, 1/L, of values (5 n, 3, p): (n, p)."""
+        ends = values.reshape(5, -1, *values.shape[1:])[1:]
+        slopes = np.sum(self.apart[..., None] * (ends[0::2] - ends[1::2]), axis=2)
+        return np.asarray(np.sum(slopes / np.sum(self.apart**2, axis=2)[..., None], axis=0))
+
+
+def crosses(body: Surface, direction: FloatArray, points: FloatArray, k: float) -> Crosses:
+    """Crosses at points of a body (n, 3), L."""
+    n = normal(body, points)
+    first = axes_of_incidence(n, direction)
+    sides = [project(body, points + sign * CLOSE / k * t) for t in (first, np.cross(n, first)) for sign in (1.0, -1.0)]
+    apart = np.stack([a - b for a, b in zip(sides[0::2], sides[1::2], strict=True)])
+    around = np.concatenate([points, *sides])
+    return Crosses(around, normal(body, around), apart)
+
+
+def field_on_body(problem: Problem, points: FloatArray, currents: SurfaceCurrents | None) -> OnBody:
+    """The field at points of the body (n, 3); ``currents`` of the whole body are those that stand behind it, if any."""
+    if isinstance(currents, (TileCurrents, ConductorTileCurrents)) and problem.order == 2:
+        return _solved_on(currents, points)
+    checked_plain(problem.body, edgeless="the field at points of the body")
+    currents = None if stands_alone(problem) else currents
+    if not problem.vector:
+        columns, _ = _by_expansions(problem, points, normal(problem.body, points), len(points), currents)
+        return OnBody([without_tips(one) for one in columns] if is_piecewise(problem.body) else columns)
+    cross = crosses(problem.body, problem.direction, points, problem.wavenumber)
+    columns, each = _by_expansions(problem, cross.points, cross.normals, len(points), currents)
+    J, k = np.stack(each, axis=-1), problem.wavenumber
+    charge, turned = cross.divergence(J), cross.divergence(np.cross(J, cross.normals[:, :, None], axis=1))
+    # of two slopes, each of which errs as J does
+    error = np.sqrt(2) * np.stack([one.error for one in columns], axis=1)
+    return OnBody(columns, charge / (1j * k), error, -turned / k)
+
+
+def _solved_on(currents: TileCurrents | ConductorTileCurrents, points: FloatArray) -> OnBody:
+    """Solved currents at points (n, 3), L, and a conductor's charge."""
+    found = currents.on_body(points)
+    if isinstance(currents, TileCurrents):
+        return OnBody([measured_field(found.values, found.error, "equation", lit=found.lit)])
+    values = found.values
+    if not is_piecewise(currents.body):
+        # normals of tiles are not quite those of the body; on an edge each face has its own
+        values = along_body(normal(currents.body, points), values)
+    error = np.maximum(found.error, ON_BODY * np.max(currents.left_of_each, axis=0))
+    pairs = zip(columns_of(values), columns_of(error), strict=True)
+    columns = [measured_field(J, off, "equation", lit=found.lit) for J, off in pairs]
+    return OnBody(columns, *currents.charge_on_body(points, found.values))
+
+
+def _by_expansions(
+    problem: Problem, points: FloatArray, normals: FloatArray, count: int, currents: SurfaceCurrents | None
+) -> tuple[list[PointValues], list[ComplexArray]]:
+    """The field of each polarisation at the first ``count`` of points (n, 3), and a vector's values at all (n, 3).
+
+    ``currents`` say what comes from elsewhere on the body.
+    """
+    left = left_behind(problem, currents)
+    lit, lit_off, share = _lit_at(problem, points, normals)
+    if currents is not None and problem.order == 2 and currents.bounces and not is_piecewise(problem.body):
+        # as much may come later, to and fro, and to the dark side, whose rays do not know of it
+        at = np.flatnonzero(share > 0) if problem.vector else np.arange(len(points))
+        thrown = currents.reflected_onto(points[at], normals[at])
+        here = wide(share[at], lit) * thrown
+        lit[at] += here
+        lit_off[at] = np.hypot(lit_off[at], np.linalg.norm(here, axis=1) if problem.vector else np.abs(thrown))
+    rays, by = rays_on(problem, points, normals, count, 1 - share)
+    found, values = [], []
+    for one, off, sums, behind in zip(columns_of(lit), columns_of(lit_off), rays, left, strict=True):
+        centre = RaySum(sums.values[:count], sums.error, sums.status, sums.faded)
+        parts = one[:count], off[:count], share[:count]
+        field = composed(problem.fan, parts, centre, by, float(behind), problem.wavenumber, problem.kind, problem.unit)
+        found.append(field)
+        if problem.vector:
+            # what is left out at a point is left out around it
+            dropped = np.all(field.creeping == 0, axis=1) | ~np.all(np.isfinite(centre.values), axis=1)
+            values.append(one + np.where(np.tile(dropped, 5)[:, None], 0.0, sums.values))
+    return found, values
+
+
+def _lit_at(problem: Problem, points: FloatArray, normals: FloatArray) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """The lit side's part at points (n, ...), its error (n,) or (n, p), and its share (n,)."""
+    body, d, k, order = problem.body, problem.direction, problem.wavenumber, problem.order
+    at, part = lit_part(body, problem.fan.line, nodes_at(body, points, normals), k)
+    if problem.vector:
+        wave, other = (lit_vectors(part, d, problem.electric, k, o) for o in (2, 1))
+        large, change = np.linalg.norm(wave, axis=1), np.linalg.norm(wave - other, axis=1)
+    else:
+        wave, other = lit_waves(part, d, size(body), k, problem.kind)[:: 1 if order == 2 else -1]
+        large, change = np.abs(wave), np.abs(wave - other)
+    values = np.zeros((len(points), *wave.shape[1:]), dtype=complex)
+    error, share = np.zeros((len(points), *large.shape[1:])), np.zeros(len(points))
+    share[at] = part.weights
+    values[at] = wide(part.weights, wave) * wave
+    pairs = zip(columns_of(large), columns_of(change), strict=True)
+    off = [part.weights * lit_error(part, *pair, k, problem.kind, order, size(body)) for pair in pairs]
+    error[at] = np.stack(off, axis=-1) if problem.vector else off[0]
+    return values, error, share
+
+
+def rays_on(
+    problem: Problem, points: FloatArray, normals: FloatArray, count: int, share: FloatArray
+) -> tuple[list[RaySum], Words]:
+    """Sums over rays at points of the body (n, 3), of each polarisation, and the method of the first ``count``.
+
+    Errors and statuses are of the first ``count``, around which the others stand; ``share`` (n,) is that of rays that
+    have just left the line.
+    """
+    fan, k, kind, vector = problem.fan, problem.wavenumber, problem.kind, problem.vector
+    plain = ELECTRIC_HARD if vector else kind
+    marched = marches(fan, plain, problem.order, len(points) * (2 if vector else 1), k)
+    if march_alone(fan.body, kind) and not marched:
+        nothing = np.zeros(count)
+        none = np.full(count, int(FieldStatus.NO_RAY))
+        return [RaySum(np.zeros(len(points), dtype=complex), nothing, none, nothing)], np.full(count, "none")
+    found = shed_on(fan_strips(fan), fan.body, points)
+    young = fock_parameter(found.rays, k) < TAKEN_OVER
+    if marched:
+        table = fan_waves(fan, wavenumber=k, boundary=plain)
+        if vector:
+            soft = fan_waves(fan, wavenumber=k, boundary=SOFT)
+            both = ConductorWaves(table, soft, problem.direction, problem.electric)
+            of = both.on_rays(fan.body, found, points, normals)
+            sums = marched_sums(fan, table, found, points, share, young, of, both.components)
+            # feet of beams have tangents of their own
+            sums = [replace(one, values=_along(normals, one.values)) for one in sums]
+        else:
+            sums = marched_sums(fan, table, found, points, share, young, scalar_on_rays(table, found))
+        few = [RaySum(one.values, one.error[:count], one.status[:count], one.faded[:count]) for one in sums]
+        return few, np.full(count, "march")
+    weight = np.where(young, share[found.observer], 1.0)
+    waves, other = _modes(problem, found.rays, points[found.observer], normals[found.observer])
+    with np.errstate(invalid="ignore"):
+        # a wave may be infinite
+        waves, other = (np.where(wide(weight, one) > 0, one * wide(weight, one), 0.0) for one in (waves, other))
+    middle = found.observer < count
+    strength = _strength(found.rays[middle], weight[middle], k) if vector else None
+    sums = []
+    for wave, its in zip(columns_of(waves), columns_of(other), strict=True):
+        pair = wave[middle], its[middle]
+        own = own_error(found.rays[middle], pair, k, kind, problem.order, mixed=strength)
+        one = ray_sum(fan, found[middle], count, pair[0], own, k, plain, strength)
+        sums.append(replace(one, values=total_of(wave, found.observer, len(points))))
+    return sums, np.full(count, "rays")
+
+
+def _modes(
+    problem: Problem, rays: RayPoints, points: FloatArray, normals: FloatArray
+) -> tuple[ComplexArray, ComplexArray]:
+    """Creeping modes of rays at points of the body (m, 3), by the order asked for and by the other one: (m, ...)."""
+    k, orders = problem.wavenumber, (problem.order, 3 - problem.order)
+    if not problem.vector:
+        first, second = (surface_waves(rays, k, problem.kind, order) for order in orders)
+        return first, second
+    # rays pass through points of the body that differ from those of the strip by its error alone
+    twist = nodes_at(problem.body, points, normals).twist(rays.directions)
+    with np.errstate(invalid="ignore"):
+        first, second = (
+            ray_vectors(rays, normals, twist, problem.direction, problem.electric, k, order) for order in orders
+        )
+    return first, second
+
+
+def _along(normals: FloatArray, vectors: ComplexArray) -> ComplexArray:
+    """Vectors (n, 3) without their parts along normals (n, 3)."""
+    return np.asarray(vectors - np.sum(normals * vectors, axis=1, keepdims=True) * normals)
+
+
+def _strength(rays: RayPoints, weight: FloatArray, k: float) -> FloatArray:
+    """|u| of rays (m,): what their currents of either polarisation are made of."""
+    with np.errstate(invalid="ignore"):
+        return np.where(weight > 0, np.abs(surface_waves(rays, k, ELECTRIC_HARD, 1)) * weight, 0.0)

@@ -3,7 +3,7 @@
 By identity: bodies may be equal to others, or not be hashable.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from typing import TypeVar
 from weakref import finalize
 
@@ -27,3 +27,13 @@ def memo(owner: object, name: str, make: Callable[[], T]) -> T:
         own[name] = make()
     found: T = own[name]
     return found
+
+
+def memo_of(owner: object, name: str, key: Hashable, make: Callable[[], T], most: int) -> T:
+    """The same for a name and a key, of which the last ``most`` that were made are kept."""
+    known: dict[Hashable, T] = memo(owner, name, dict)
+    if key not in known:
+        while len(known) >= most:
+            known.pop(next(iter(known)))
+        known[key] = make()
+    return known[key]

@@ -18,10 +18,10 @@ from creeping._progress import reporting
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError, SingularIncidenceError
 from creeping.field.arguments import checked, checked_across, checked_method, checked_plain
-from creeping.field.body_currents import expected_seconds
 from creeping.field.boundary import BoundaryLike
 from creeping.field.equation.solving import is_rough
 from creeping.field.results.echo import Echo
+from creeping.field.routes import expected_seconds
 from creeping.field.tmatrix.computing import pays
 from creeping.field.validity_range import is_reached
 from creeping.geodesics.direct_flow import DirectFlow

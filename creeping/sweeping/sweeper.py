@@ -7,10 +7,12 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import SurfaceError
-from creeping.field.body_currents import affordable
-from creeping.field.boundary import BoundaryLike, parse_boundary, scalar_boundaries
+from creeping.field.boundary import BoundaryLike, parse_boundary
+from creeping.field.currents.whole_body import far_by_currents
 from creeping.field.far import far_field
+from creeping.field.problem import Problem
 from creeping.field.results.far_result import FarField
+from creeping.field.routes import far_currents
 from creeping.field.validity_range import launch_validity, validities
 from creeping.field.waves.far_geometry import FarGeometry
 from creeping.field.waves.far_rays import Parts, parts_of
@@ -177,12 +179,10 @@ class Sweeper:
 
 def _by_currents(fan: RayFan, observers: FloatArray, wavenumber: float, boundary: BoundaryLike) -> FarField | None:
     """Far field of one incidence by currents, if there are any that are affordable."""
-    if not affordable(fan, len(scalar_boundaries(boundary)) * len(observers), wavenumber, distant=True):
-        return None
-    try:
-        return far_field(fan, observers, wavenumber=wavenumber, boundary=boundary, method="currents")
-    except SurfaceError:
-        return None
+    with suppress(SurfaceError):
+        currents = far_currents(Problem(fan, wavenumber, boundary), len(observers))
+        return far_by_currents(currents, observers, boundary) if currents else None
+    return None
 
 
 def fill_lines(lines: ShadowLines, out: dict[str, Any]) -> None:

@@ -9,7 +9,7 @@ from command_line import creeping, ran, table
 from ended import ending_at, killed, stamps
 
 from creeping.commands import resuming
-from creeping.field import far
+from creeping.field import far, routes
 from creeping.storage.parts import Parts
 from creeping.sweeping import blocks
 from creeping.sweeping.storage.layout import StoreArrays
@@ -118,7 +118,7 @@ def test_a_grid_of_directions_goes_on(tmp_path, monkeypatch, capsys, by):
     words = ["run", "sphere", "--direction", 1, 0, 0, "--wavenumber", 30, "--observe", "grid:30", "--no-pictures"]
     words += ["--rays", 16, "--no-cache"]
     if by == "rays":
-        monkeypatch.setattr(far, "affordable", lambda *_, **__: False)
+        monkeypatch.setattr(routes, "affordable", lambda *_, **__: False)
         monkeypatch.setattr(far, "measured_level", lambda *_: None)
     monkeypatch.setattr(far, "TOGETHER", 40)
     assert ran(*words, "-o", tmp_path / "whole") == 0

@@ -5,7 +5,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.field import on_body
+from creeping.field import routes
 from creeping.field.special.fock import surface_function
 from tests.reference import sphere, sphere_admittance
 
@@ -44,7 +44,7 @@ def test_reference_is_the_series_of_a_constant_admittance():
 def test_field_on_the_body_is_that_of_the_exact_sphere(fan, judged, monkeypatch):
     """Without currents, which only judge it, values are the same and more errors are bounds."""
     if not judged:
-        monkeypatch.setattr(on_body, "affordable", lambda *_: False)
+        monkeypatch.setattr(routes, "affordable", lambda *_, **__: False)
     points = spread(150)
     found = cr.surface_field(fan, points, wavenumber=K, boundary=BOUNDARY)
     exact = sphere_admittance.surface_field(K, 1.0, D, ETA, points)
@@ -144,7 +144,7 @@ def test_what_goes_by_modes_says_what_does_not(fan):
 
 def test_each_ray_is_marched(fan, monkeypatch):
     """Where a single ray passes, its own wave is the field."""
-    monkeypatch.setattr(on_body, "affordable", lambda *_: False)
+    monkeypatch.setattr(routes, "affordable", lambda *_, **__: False)
     own = cr.surface_field(fan, wavenumber=K, boundary=BOUNDARY)
     step = int(np.searchsorted(fan.travel_time, 0.8))
     ok = own.ok[:, step]

@@ -6,7 +6,7 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.errors import InvalidInputError
-from creeping.field import on_body
+from creeping.field import routes
 from creeping.field.equation import effort
 from studies.accuracy import joints
 
@@ -67,7 +67,7 @@ def test_each_ray_crosses_joints():
 
 
 def test_the_unit_of_length_is_no_matter(monkeypatch):
-    monkeypatch.setattr(on_body, "affordable", lambda *_: False)
+    monkeypatch.setattr(routes, "affordable", lambda *_, **__: False)
     monkeypatch.setattr(effort, "SECONDS", 0.0)
     points = np.array([[1.0, 0.0, 0.1], [0.0, 0.6, 1.05], [0.0, -1.0, -0.2]])
     d = (0.9, 0.0, 0.4)
@@ -122,7 +122,7 @@ def test_along_the_axis_the_equation_starts_from_nothing(boundary, k, most):
 @pytest.mark.slow
 def test_along_the_axis_where_the_equation_is_too_large(monkeypatch):
     """Rays and optics far away, and elsewhere words or a status, no foreign error."""
-    monkeypatch.setattr(on_body, "affordable", lambda *_: False)
+    monkeypatch.setattr(routes, "affordable", lambda *_, **__: False)
     monkeypatch.setattr(effort, "SECONDS", 0.0)
     fan = fan_of(PILL, (0, 0, 1), n_rays=16)
     far = cr.far_field(fan, [(0, 0, 1.0)], wavenumber=5.0, boundary="hard")

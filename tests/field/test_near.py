@@ -6,8 +6,8 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.errors import InvalidInputError
-from creeping.field.near import FINE
 from creeping.field.results.point_result import FieldStatus
+from creeping.field.routes import TRUST
 from creeping.shadow.attachment import occluded
 from tests.reference import sphere
 
@@ -67,16 +67,16 @@ def test_auto_takes_rays_deep_in_the_shadow_and_currents_elsewhere(fan, boundary
     # what auto takes is what states the smaller error
     taken = np.where(u.method[5:8] == "rays", by_rays, by_currents)
     np.testing.assert_allclose(u[5:8], taken, rtol=1e-12)
-    assert np.all((u.error[5:8] <= by_currents.error) | (u.error[5:8] < FINE))
+    assert np.all((u.error[5:8] <= by_currents.error) | (u.error[5:8] < TRUST.fine))
 
 
 def test_currents_are_not_made_where_rays_are_fine(fan, monkeypatch):
-    import creeping.field.near as near
+    from creeping.field import near
 
     def refused(*_):
         raise AssertionError("currents were made")
 
-    monkeypatch.setattr(near, "cached_currents", refused)
+    monkeypatch.setattr(near, "currents_near", refused)
     y = np.array([[0.6, 0.0, 1.0], [0.0, 0.7, 0.85]])
     assert np.all(cr.near_field(fan, y, wavenumber=40.0, boundary="soft").method == "rays")
     with pytest.raises(AssertionError, match="currents were made"):

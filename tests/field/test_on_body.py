@@ -138,15 +138,15 @@ def test_what_comes_from_elsewhere_is_bounded_where_it_cannot_be_measured(torus,
 
 
 def test_a_body_too_thin_to_look_inside_has_bounds(monkeypatch, torus):
-    import creeping.field.on_body as module
+    from creeping.field import routes
 
     class Unknown:
-        body, extinction, solved = torus.body, float("nan"), False
+        solved, bounces, left_of_each = False, True, np.array([[np.nan]])
 
         def reflected_onto(self, points, normals):
             return np.zeros(len(points))
 
-    monkeypatch.setattr(module, "cached_currents", lambda *_: Unknown())
+    monkeypatch.setattr(routes, "cached_currents", lambda *_, **__: Unknown())
     x = [(1 + 0.5 * np.cos(2.5), 0.0, -0.5 * np.sin(2.5))]
     u = cr.surface_field(torus, x, wavenumber=30.0, boundary="soft")
     assert u.status_counts == {"UNRESOLVED": 1} and u.error_by[0] == "bound" and u.error[0] >= 2 * 30.0

@@ -144,10 +144,8 @@ def test_the_axis_of_a_torus_is_unresolved_without_the_equation(boundary, monkey
 
 
 def test_an_error_that_is_not_known_is_not_ok(fan, monkeypatch):
-    import creeping.field.near as module
-
-    taken = module.total_at
-    monkeypatch.setattr(module, "total_at", lambda *given: (*taken(*given)[:2], np.full(len(given[1]), np.nan)))
+    taken = cr.SurfaceCurrents.total
+    monkeypatch.setattr(cr.SurfaceCurrents, "total", lambda *of: (taken(*of)[0], np.full(len(of[1]), np.nan)))
     u = cr.near_field(fan, [(0.0, 0.0, -2.0)], wavenumber=K, boundary="hard", method="currents")
     assert u.status_counts == {"UNRESOLVED": 1} and u.error_by[0] == "bound"
 

@@ -5,7 +5,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.field.on_body import ray_magnitude
+from creeping.field.on_rays import ray_envelope
 from creeping.geometry.surface import normal
 from tests.reference import clouds
 from tests.reference.fundamental import beside_source
@@ -127,7 +127,7 @@ REFUSED = {
     "surface_currents": lambda fan: cr.surface_currents(fan, **K),
     "conductor_field": lambda fan: cr.conductor_field(fan, OUT, polarisation="theta", **K),
     "conductor_current": lambda fan: cr.conductor_current(fan, ON, polarisation="theta", **K),
-    "ray_magnitude": lambda fan: ray_magnitude(fan, **K),
+    "ray_envelope": lambda fan: ray_envelope(fan, boundary="soft", **K),
     "direction": lambda fan: fan.line.direction,
 }
 

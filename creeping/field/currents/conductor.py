@@ -10,7 +10,19 @@ Du is u with t under Fock's integral. The current of v flows in the direction co
 to b by its rate along the ray, and because h, by which it starts, varies across the rays at the rate kappa_t1 e. Both
 are exact on the circular cylinder and on the sphere.
 
-Sources: [F46], [CK13, sec. 6.2]; Derivations, F18.
+Also here: the same by marched waves, for rays and for the beams that carry vectors where these merge.
+
+    u: H along b, u_n + kappa_t u = 0,   v: dE/dn along b, E = 0
+    J = sum of beams of u with V + M n V',   V = -h (1 + T C) p - t rho j p + (j + h t rho C) b,   V' = -h b
+    error^2 = (|h| e_u)^2 + (|e| e_v/k)^2 + [A max(1, r) |u|/m^4]^2 + [B |u|/m^2]^2
+
+with C = Du/(2 m^2 u) of creeping modes, 0 where they have ended; m and r = rho kappa_t in the error are of the launch
+point. The condition of u is that of E along the ray, (curl H)_p = 0 on the body. The beam of u turns by M n, so that
+-h (p + M n b) is (i/k) grad (h u): beside a ray that is its -e (i kappa_t1/(kJ)) u b, which grows without bound where
+J = 0, and the sum does not. A stands for what both scalar problems leave out of Maxwell's, B for what passes from one
+to the other where the body twists; both were set on a sphere, three ellipsoids, an egg and the twisted ellipsoid.
+
+Sources: [F46], [CK13, sec. 6.2]; [C93], [P82]; Derivations, F18, F22, F24, F26 and F31.
 """
 
 from collections.abc import Callable
@@ -20,22 +32,34 @@ from typing import ClassVar
 
 import numpy as np
 
-from creeping._typing import BoolArray, ComplexArray, FloatArray
-from creeping.field.arguments import fock_parameter, scales
+from creeping._typing import BoolArray, ComplexArray, FloatArray, IntArray
+from creeping.field.arguments import fock_parameter, scales, transverse_ratios
 from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT
-from creeping.field.currents.bounce import received_vectors
 from creeping.field.currents.lit import STEEPEST, lit_conductor
 from creeping.field.currents.nodes import LitNodes, RayNodes
 from creeping.field.currents.radiation import (
     electric_field_of_vector,
     far_of_vector,
     magnetic_field_of_vector,
+    received_vectors,
 )
-from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.field.currents.whole_body import SurfaceCurrents, level_at
+from creeping.field.marching.fan_rays import FLAT
+from creeping.field.marching.fan_waves import FanWaves, OnRays, at_shed
 from creeping.field.results.far_result import spherical_frame
 from creeping.field.special.fock import surface_function
+from creeping.field.waves.shed_wave import smoothstep
+from creeping.field.waves.strip_waves import StripTable, resampled, without_tubes
 from creeping.field.waves.surface import ray_factor, surface_waves
+from creeping.geometry.quadrature import BodyNodes, nodes_at
+from creeping.geometry.surface import Surface
 from creeping.rays.quantities import RayPoints
+from creeping.rays.shedding import ShedRays
+
+NEXT, MIXED = 0.5, 0.25
+"""A and B."""
+LEAST = 1e-9
+"""Size of u below which v and Du are no shares of it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -52,6 +76,7 @@ class ConductorCurrents(SurfaceCurrents):
 
     mix: ComplexArray = field(default_factory=lambda: np.eye(2, dtype=complex))
     _factors: ClassVar[tuple[float, float]] = (2.8, 2.3)
+    _levels: ClassVar[tuple[float, float, float]] = (2.3, 4.6, 2.3)
 
     def polarised(self, mix: ComplexArray) -> "ConductorCurrents":
         """Currents of incident waves with other components along theta and phi (2, p)."""
@@ -81,13 +106,22 @@ class ConductorCurrents(SurfaceCurrents):
         electric = self._electric(self.values, x) + np.multiply.outer(wave, self.incident_electric)
         return np.stack([self._at_least(self._rms(electric)), self._left])
 
-    def changed_electric(self, points: FloatArray) -> FloatArray:
-        """As `changed`, of E and components added (m, p)."""
-        return self._changed(electric_field_of_vector, points) / self._electric_inside
+    def total(self, points: FloatArray, dark: BoolArray) -> tuple[ComplexArray, FloatArray]:
+        """Incident and scattered E and H (m, 6, p) at points (m, 3), L, some in the dark, and their error (m, p)."""
+        scattered = np.concatenate([self.scattered_electric(points), self.scattered(points)], axis=1)
+        left, (lit, shadow, factor) = self.left_of_each, self._levels
+        shapes = (
+            self._changed(electric_field_of_vector, points) / self._electric_inside,
+            self._changed(magnetic_field_of_vector, points) / self._change_inside,
+        )
+        level = np.stack([level_at(self, points, dark, float(mean), lit, shadow) for mean in self._amplitude], axis=1)
+        each = [part * np.hypot(level, factor * shape) for part, shape in zip(left, shapes, strict=True)]
+        return self.incident_at(points) + scattered, np.maximum(*each)
 
-    def changed_magnetic(self, points: FloatArray) -> FloatArray:
-        """As `changed`, components added (m, p)."""
-        return self._changed(magnetic_field_of_vector, points) / self._change_inside
+    def incident_at(self, points: FloatArray) -> ComplexArray:
+        """E and H of the incident waves at points (m, 3), L: (m, 6, p)."""
+        both = np.concatenate([self.incident_electric, self._incident])
+        return np.asarray(np.multiply.outer(np.exp(1j * self.wavenumber * (points @ self.direction)), both))
 
     def _changed(self, radiated: Callable[..., ComplexArray], points: FloatArray) -> FloatArray:
         """What the second order of the lit nodes and of the others adds, apart, in the root of squares (m, p)."""
@@ -116,11 +150,6 @@ class ConductorCurrents(SurfaceCurrents):
         """Rms of |f| over all directions, L, of each incident wave."""
         forward = np.sum(np.conj(self.mix) * self.far(self.direction[None])[0], axis=0)
         return np.asarray(np.sqrt(np.abs(forward.imag) / self.wavenumber))
-
-    @property
-    def amplitudes(self) -> FloatArray:
-        """Rms of |f| over all directions, L, of each incident wave (p,)."""
-        return self._amplitude
 
     @property
     def _incident(self) -> ComplexArray:
@@ -222,3 +251,83 @@ def vectors_of(
     along = -h * (hard + turn**2 * changing)[:, None] - turn[:, None] * across
     across = across + h * (turn * changing)[:, None]
     return np.asarray(p[:, :, None] * along[:, None] + b[:, :, None] * across[:, None])
+
+
+@dataclass(frozen=True, eq=False)
+class ConductorWaves:
+    """Marched waves of a conductor on the strips of a fan, u and v, for incident E0 (3, p).
+
+    Attributes
+    ----------
+    hard, soft : FanWaves
+        u and v.
+    direction : (3,)
+    electric : (3, p) complex
+    """
+
+    hard: FanWaves
+    soft: FanWaves
+    direction: FloatArray
+    electric: ComplexArray
+
+    def on_rays(self, body: Surface, shed: ShedRays, points: FloatArray, normals: FloatArray) -> OnRays:
+        """J of the rays found at points of the body (n, 3), L, with these normals."""
+        k, rays = self.hard.wavenumber, shed.rays
+        hard, soft, changing = self.hard, self.soft, self.changing
+        of = hard.at, soft.at, changing.at, hard.error, soft.error, self._heights
+        y, v, change, off_u, off_v, both = at_shed(shed, len(hard.strips), *of)
+        h, e = both[:, 0], both[:, 1]
+        nodes = nodes_at(body, points[shed.observer], normals[shed.observer])
+        p = rays.directions
+        across = e * (1j / k * v - 1j / k * rays.transverse[0] * spread_of(rays, k) * y)[:, None]
+        turn = faded(nodes.curvature(p), nodes.twist(p), rays.curvature[0])
+        J = vectors_of(p, np.cross(nodes.normals, p), h, across, y, turn, y * change)
+        size = np.maximum(np.linalg.norm(J, axis=1), np.abs(y)[:, None])
+        m, r = scales(rays, k)[0], np.abs(transverse_ratios(rays)[0])
+        rest = np.abs(y) * np.hypot(NEXT * np.maximum(r, 1.0) / m**4, MIXED / m**2)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            error = np.sqrt(np.abs(h * off_u[:, None]) ** 2 + np.abs(e * off_v[:, None] / k) ** 2 + rest[:, None] ** 2)
+            share = np.where(size > 0, error / size, 0.0)
+        # without a wave there is no share of one
+        return OnRays(J, size, np.where(np.isfinite(off_u + off_v)[:, None], share, np.inf))
+
+    def components(
+        self, strip: int, sigma: FloatArray, s: FloatArray, nodes: BodyNodes, p: FloatArray
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """V and V' (n, 3 p) of the beams at places (n,) of a strip, at nodes with tangents p (n, 3)."""
+        (h, e), (rays, back) = np.moveaxis(self._heights(strip, sigma, s), 1, 0), self._starts(strip, sigma)
+        b = np.cross(nodes.normals, p)
+        turn = faded(nodes.curvature(p), nodes.twist(p), rays.curvature[1][back])
+        u, v = self.hard.at(strip, sigma, s), self.soft.at(strip, sigma, s)
+        there = np.abs(u) > LEAST
+        ratio = np.where(there, 1j / self.hard.wavenumber * v / np.where(there, u, 1.0), 0.0)
+        V = vectors_of(p, b, h, e * ratio[:, None], np.ones(len(p)), turn, self.changing.at(strip, sigma, s))
+        lean = -b[:, :, None] * h[:, None]
+        return V.reshape(len(p), -1), lean.reshape(len(p), -1)
+
+    @cached_property
+    def changing(self) -> StripTable:
+        """C of creeping modes, 0 where they have ended."""
+        strips, times, table = self.hard.strips, self.hard.times, []
+        for strip in strips:
+            alive, ratio = strip.rays.alive, np.zeros(strip.rays.alive.shape, dtype=complex)
+            hard, _, changing = ray_scalars(without_tubes(strip.rays)[alive], self.hard.wavenumber, 2)
+            ratio[alive] = np.where(np.abs(hard) > LEAST, changing / np.where(np.abs(hard) > LEAST, hard, 1.0), 0.0)
+            table.append(resampled(strip, ratio, times))
+        return StripTable(strips, times, table)
+
+    def _heights(self, strip: int, sigma: FloatArray, _: FloatArray) -> ComplexArray:
+        """H and e of the incident waves where rays at places (n,) of a strip begin: (n, 2, p)."""
+        rays, back = self._starts(strip, sigma)
+        axes = np.broadcast_to(self.direction, rays.first_normal.shape)
+        return np.stack(amplitudes(rays.first_normal, axes, self.direction, self.electric), axis=1)[back]
+
+    def _starts(self, strip: int, sigma: FloatArray) -> tuple[RayPoints, IntArray]:
+        """Where rays at places (n,) of a strip begin, each once, and which of these belongs to each place (n,)."""
+        distinct, back = np.unique(sigma, return_inverse=True)
+        return self.hard.strips[strip].at(distinct, np.zeros(len(distinct))), back
+
+
+def faded(curvature: FloatArray, twist: FloatArray, first: FloatArray) -> FloatArray:
+    """T rho (n,), fading out as Lambda does where the body is much flatter than at the launch point, ``first``, 1/L."""
+    return turn_of(curvature, twist) * smoothstep(curvature / first, 0.0, FLAT)

@@ -37,22 +37,26 @@ were set on four bodies (`studies.accuracy.point_coverage`).
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
+from creeping._progress import say
 from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.arguments import observers_of
-from creeping.field.boundary import Boundary
-from creeping.field.currents.bounce import received
-from creeping.field.currents.radiation import far_of_scalar, field_of_scalar, phase_sums
+from creeping.field.arguments import UNRESOLVED, observers_of
+from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
+from creeping.field.currents.radiation import far_of_scalar, field_of_scalar, phase_sums, received
+from creeping.field.results.far_result import FarField
 from creeping.geodesics.bundle import as_points
+from creeping.geometry.checks import unit_of
 from creeping.geometry.parts import inside
 from creeping.geometry.quadrature import body_nodes, inner_points
 from creeping.geometry.surface import Surface
+from creeping.storage.parts import Keeping, not_kept
 
 DEPTH = 0.25
 """Least depth, in wavelengths, of the points inside at which currents are judged: nearer the sums over nodes err."""
@@ -70,8 +74,6 @@ BESIDE, STEP, LARGEST = 6, 0.05, 2.0
 POINTS = 100
 """Points inside at which they are judged."""
 
-LIT_LEVEL, DARK_LEVEL, SHAPE = 2.0, 4.0, 2.0
-"""Factors L and S of the error."""
 ABSORBING_LEVEL = 1.3
 """L in the light of an impedance: most of what is wrong with its currents stands at the line and radiates ahead."""
 OFF = 0.25
@@ -141,6 +143,8 @@ class SurfaceCurrents:
     solved: bool = False
     _factors: ClassVar[tuple[float, float]] = (2.5, 2.0)
     """Factors of the error: of what all directions share, and of what the second order says of each."""
+    _levels: ClassVar[tuple[float, float, float]] = (2.0, 4.0, 2.0)
+    """L in the light and in the shadow, and S, of the error at points."""
     _least: ClassVar[float] = 0.0
     """What is left inside, at least: points deep inside may know less of what is wrong."""
 
@@ -188,6 +192,11 @@ class SurfaceCurrents:
                 f"(first: row {close[0]}); near_field and surface_field give the field there"
             )
         return x
+
+    @property
+    def bounces(self) -> bool:
+        """Whether `reflected_onto` knows the boundary."""
+        return self.boundary.kind in ("soft", "hard", "conductor")
 
     def reflected_onto(self, points: FloatArray, normals: FloatArray) -> ComplexArray:
         """u, or du/dn if soft (m,), that points (m, 3), L, of the body, with normals, receive from nodes above them."""
@@ -247,17 +256,27 @@ class SurfaceCurrents:
         error = self._left * np.hypot(np.hypot(level * share * along, own), shape * change)
         return np.asarray(np.hypot(error, 0.0 if self.solved else QUADRATURE * self._amplitude))
 
-    def changed(self, points: ArrayLike) -> FloatArray:
-        """Second-order part of the field at points (m, 3), L, off the body, over its rms inside the body: (m,)."""
-        return self._with_change(as_points(points).reshape(-1, 3))[1]
+    def total(self, points: FloatArray, dark: BoolArray) -> tuple[ComplexArray, FloatArray]:
+        """Total field and its error at points (m, 3), L, off the body, some of them in the dark: (m,) each."""
+        lit, shadow, factor = self._levels
+        if self.boundary.kind == "impedance":
+            lit = ABSORBING_LEVEL
+        level = level_at(self, points, dark, self.mean_amplitude, lit, shadow)
+        x = self._off_the_body(points)
+        # on the lit nodes and on the others, whose second orders count apart
+        lit_part, dark_part = (self._parts_of_field(part, x) for part in (self.lit, ~self.lit))
+        shape = np.hypot(np.abs(lit_part[1]), np.abs(dark_part[1])) / self._change_inside
+        total = self.incident_at(x) + lit_part[0] + dark_part[0]
+        return total, self.extinction * np.hypot(level, factor * shape)
 
-    def scattered_and_changed(self, points: ArrayLike) -> tuple[ComplexArray, FloatArray]:
-        """`scattered` and `changed` at points (m, 3), L, computed in one sum over the nodes: (m, ...) each."""
-        return self._with_change(self._off_the_body(points))
+    def incident_at(self, points: FloatArray) -> ComplexArray:
+        """The incident wave at points (m, 3), L: (m,)."""
+        return np.asarray(np.exp(1j * self.wavenumber * (points @ self.direction)))
 
-    def _with_change(self, x: FloatArray) -> tuple[ComplexArray, FloatArray]:
-        lit, dark = (self._parts_of_field(part, x) for part in (self.lit, ~self.lit))
-        return lit[0] + dark[0], np.asarray(np.hypot(np.abs(lit[1]), np.abs(dark[1])) / self._change_inside)
+    @cached_property
+    def left_of_each(self) -> FloatArray:
+        """What is left inside, as `extinction`, of each field and incident wave: (1, 1)."""
+        return np.array([[self.extinction]])
 
     def _together(self, directions: FloatArray) -> FloatArray:
         """[1 + 0.3 max(0, S - 1)]^(1/2) in unit directions (m, 3): (m,)."""
@@ -352,7 +371,7 @@ class SurfaceCurrents:
         return strength, np.asarray(-1j * self.wavenumber * self.boundary.at(self.points).admittance * strength)
 
 
-def far_enough(body: Surface, wavenumber: float, points: FloatArray, least: float = OFF) -> BoolArray:
+def far_enough(body: Surface, wavenumber: float, points: FloatArray, least: float) -> BoolArray:
     """Whether points (n, 3), L, are so far off the body that sums over nodes are integrals: (n,).
 
     ``least`` is the distance asked for, in wavelengths.
@@ -366,17 +385,6 @@ def far_enough(body: Surface, wavenumber: float, points: FloatArray, least: floa
     return body_nodes(body, 2 * wavenumber).distance(points) > least * 2 * np.pi / wavenumber
 
 
-def total_at(
-    currents: SurfaceCurrents, points: FloatArray, dark: BoolArray
-) -> tuple[ComplexArray, ComplexArray, FloatArray]:
-    """Incident and scattered field and the error of their sum at points (n, 3), L, some of them in the dark: (n,)."""
-    incident = np.exp(1j * currents.wavenumber * (points @ currents.direction))
-    lit = ABSORBING_LEVEL if currents.boundary.kind == "impedance" else LIT_LEVEL
-    level = level_at(currents, points, dark, currents.mean_amplitude, lit, DARK_LEVEL)
-    scattered, shape = currents.scattered_and_changed(points)
-    return incident, scattered, currents.extinction * np.hypot(level, SHAPE * shape)
-
-
 def level_at(
     currents: SurfaceCurrents, points: FloatArray, dark: BoolArray, mean: float, lit: float, shadow: float
 ) -> FloatArray:
@@ -385,3 +393,40 @@ def level_at(
     away = np.linalg.norm(points - middle, axis=1)
     in_shadow = shadow / np.hypot(1, away / (currents.wavenumber * mean**2))
     return np.asarray(np.where(dark, in_shadow, lit / np.hypot(1, away / mean)))
+
+
+def far_by_currents(
+    currents: SurfaceCurrents,
+    r: FloatArray,
+    boundary: BoundaryLike,
+    *,
+    left_out: float = 0.0,
+    keep: Keeping = not_kept,
+) -> FarField:
+    """Far field in unit directions (m, 3); its error is that of the currents and ``left_out``, L.
+
+    ``keep`` has each sum over nodes, which takes as long for all directions as for a few.
+    """
+
+    def summed(name: str, make: Callable[[], Any]) -> Any:
+        say(f"sums over currents, {name}")
+        return keep(f"currents-{name}", lambda: {"f": make()})["f"]
+
+    lit = summed("lit", lambda: currents.far_of(currents.lit, r))
+    dark = summed("dark", lambda: currents.far_of(~currents.lit, r))
+    error = np.hypot(summed("error", lambda: currents.error(r)), left_out)
+    largest = np.max(np.abs(np.concatenate([lit + dark, currents.far(currents.direction[None])])))
+    off = ~(error < UNRESOLVED * largest)
+    return FarField(
+        directions=r.copy(),
+        total=lit + dark,
+        parts={"lit": lit, "dark": dark},
+        method=np.full(len(r), "equation" if currents.solved else "currents", dtype="<U16"),
+        unresolved=off.any(axis=tuple(range(1, off.ndim))),
+        error=error,
+        error_by="extinction",
+        wavenumber=currents.wavenumber,
+        boundary=boundary_name(boundary),
+        order=2,
+        unit=unit_of(currents.body),
+    )

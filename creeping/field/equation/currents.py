@@ -256,6 +256,14 @@ class _OnTiles(SurfaceCurrents):
         away, _ = self.matrix.tiles.fine_tree.query(points)
         return np.asarray(away * self.wavenumber <= 2 * np.pi * APART)
 
+    def total(self, points: FloatArray, dark: BoolArray) -> tuple[ComplexArray, FloatArray]:
+        """Total field and its error at points (m, 3), L, at any distance, dark or not."""
+        return self.incident_at(points) + self._scattered_at(points), self.error_around(points)
+
+    def _scattered_at(self, points: FloatArray) -> ComplexArray:
+        """Scattered field at points (m, 3), L, at any distance: (m,), of a conductor E and H (m, 6, p)."""
+        return self.scattered(points)
+
     def error_around(self, points: FloatArray) -> FloatArray:
         """Error of the total field at points (m, 3), L, at any distance: (m,), of E and H (m, p).
 
@@ -334,9 +342,6 @@ class _OnTiles(SurfaceCurrents):
         H = np.cross(across, z[:, :, None], axis=1)
         H[:, 2] = np.cross(0.5 * self._received(Places.at(points, x), values), x[:, :, None], axis=1)[:, 2]
         return H
-
-    def _with_change(self, x: FloatArray) -> tuple[ComplexArray, FloatArray]:
-        return self._field(self.values, x), np.abs(self._field(self.change, x)) / self._change_inside
 
     @cached_property
     def inner_points(self) -> FloatArray:
@@ -433,12 +438,12 @@ class ConductorTileCurrents(_OnTiles, ConductorCurrents):
         """n.E at the nodes (n, p), in units of the incident E."""
         return np.asarray(self.charges() @ self.mix)
 
-    def charge_on_body(self, points: ArrayLike, J: ComplexArray | None = None) -> tuple[ComplexArray, FloatArray]:
-        """n.E and its error, as `on_body`: (m, p) each; of the current there (m, 3, p) if it is known."""
+    def charge_on_body(self, points: ArrayLike, J: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+        """n.E and its error, as `on_body`: (m, p) each; ``J`` (m, 3, p) is the current there."""
         places = self._places(points)
         assert places.own is not None
         values = self._charge_at(places)
-        unresolved = self._unresolved(places, self.values, self._values_at(places) if J is None else J)
+        unresolved = self._unresolved(places, self.values, J)
         # the potential of what tiles do not resolve of J, which changes sign along the body
         potential = (self.wavenumber * self.matrix.tiles.reach[places.own[0]] * unresolved.T).T
         return values, np.hypot(self._error_on(places, self.charge, values, 1.0), potential)
@@ -461,6 +466,9 @@ class ConductorTileCurrents(_OnTiles, ConductorCurrents):
                 x[near], lambda y: scattered_electric(self.matrix.soft_one, y, self.values, self.charge)
             )
         return out
+
+    def _scattered_at(self, points: FloatArray) -> ComplexArray:
+        return np.concatenate([self.scattered_electric(points), self.scattered(points)], axis=1)
 
     def error_around(self, points: FloatArray) -> FloatArray:
         """The same, and what currents lack next to edges, where E and H grow."""
@@ -487,11 +495,3 @@ class ConductorTileCurrents(_OnTiles, ConductorCurrents):
     def _electric(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
         found: ComplexArray = self._finer._electric(self._at_fine(values), points)
         return found
-
-    def changed_electric(self, points: FloatArray) -> FloatArray:
-        """As `changed`, of E and components added (m, p)."""
-        return np.asarray(np.linalg.norm(self._electric(self.change, points), axis=1) / self._electric_inside)
-
-    def changed_magnetic(self, points: FloatArray) -> FloatArray:
-        """As `changed`, components added (m, p)."""
-        return np.asarray(np.linalg.norm(self._field(self.change, points), axis=1) / self._change_inside)

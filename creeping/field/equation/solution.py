@@ -18,16 +18,22 @@ from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import observers_of
 from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
-from creeping.field.currents.far_sum import far_by_currents
-from creeping.field.currents.whole_body import SurfaceCurrents
+from creeping.field.currents.whole_body import SurfaceCurrents, far_by_currents
 from creeping.field.equation.columns import solved_columns
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents, charges, twice_incident
 from creeping.field.equation.effort import FULL, Effort
 from creeping.field.equation.matrix import Matrix
 from creeping.field.equation.tiles import Tiles
-from creeping.field.results.conductor_result import ConductorCurrent, ConductorField, Fields, by_polarisation
+from creeping.field.results.conductor_result import ConductorCurrent, ConductorField, vector_near, vector_on_body
 from creeping.field.results.far_result import FarField, incident_mix, spherical_frame
-from creeping.field.results.point_result import FieldStatus, NearField, SurfaceField, judged
+from creeping.field.results.point_result import (
+    NearField,
+    SurfaceField,
+    columns_of,
+    measured_field,
+    scalar_near,
+    scalar_on_body,
+)
 from creeping.field.waves.reflected import plane_reflection
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.checks import unit_of
@@ -183,17 +189,12 @@ class Solution:
         y = as_points(points)
         x, currents = y.reshape(-1, 3), self.currents(incidence)
         on = self._on(x)
-        incident, scattered = np.exp(1j * self.wavenumber * (x @ currents.direction)), np.zeros(len(x), dtype=complex)
-        scattered[~on] = currents.scattered(x[~on])
-        if np.any(on):
-            total = 0.0 if self._kind.kind == "soft" else currents.on_body(x[on]).values
-            scattered[on] = total - incident[on]
-        lanes = self._lanes(y, incident + scattered, currents.error_around(x), 1.0)
-        shape = y.shape[:-1]
-        nothing = np.zeros(shape, dtype=complex)
-        return NearField(
-            **lanes, incident=incident.reshape(shape), scattered=scattered.reshape(shape), creeping=nothing
-        )
+        total = np.zeros(len(x), dtype=complex)
+        total[~on] = currents.incident_at(x[~on]) + currents.scattered(x[~on])
+        if np.any(on) and self._kind.kind != "soft":
+            total[on] = currents.on_body(x[on]).values
+        field = measured_field(total, currents.error_around(x), "equation")
+        return scalar_near(field, y, currents.incident_at(x), self._facts)
 
     def conductor_field(
         self, points: ArrayLike, incidence: int = 0, polarisation: str | ArrayLike | None = None
@@ -209,27 +210,18 @@ class Solution:
         """
         y, single = as_points(points), polarisation is not None
         x, currents = y.reshape(-1, 3), self._polarised("conductor_field", incidence, polarisation)
-        on = self._on(x)
-        wave, E0 = np.exp(1j * self.wavenumber * (x @ currents.direction))[:, None, None], currents.incident_electric
-        incident = np.stack([wave * E0, wave * np.cross(currents.direction, E0, axisb=0).T])
-        scattered = np.empty_like(incident)
-        scattered[0, ~on], scattered[1, ~on] = currents.scattered_electric(x[~on]), currents.scattered(x[~on])
+        on, incident = self._on(x), currents.incident_at(x)
+        total = np.empty_like(incident)
+        total[~on] = currents.total(x[~on], on[~on])[0]
         if np.any(on):
             found = currents.on_body(x[on])
             n = found.normals[:, :, None]
-            scattered[0, on] = n * currents.charge_on_body(x[on], found.values)[0][:, None] - incident[0, on]
-            scattered[1, on] = np.cross(found.values, n, axis=1) - incident[1, on]
-        size = np.max(np.linalg.norm(incident + scattered, axis=2), axis=0)
-
-        def fields(parts: ComplexArray) -> Fields:
-            return Fields(*(by_polarisation(list(np.moveaxis(v, 2, 0)), y.shape[:-1], single=single) for v in parts))
-
-        return ConductorField(
-            **self._vector_lanes(y, size, currents.error_around(x), single, E0),
-            incident=fields(incident),
-            scattered=fields(scattered),
-            creeping=fields(np.zeros_like(incident)),
-        )
+            charge = currents.charge_on_body(x[on], found.values)[0]
+            total[on] = np.concatenate([n * charge[:, None], np.cross(found.values, n, axis=1)], axis=1)
+        pairs = zip(columns_of(total), columns_of(currents.error_around(x)), strict=True)
+        columns = [measured_field(values, error, "equation") for values, error in pairs]
+        facts = self._facts | {"incident_electric": _electric(currents, single)}
+        return vector_near(columns, y, incident, facts, single=single)
 
     def conductor_current(
         self, points: ArrayLike, incidence: int = 0, polarisation: str | ArrayLike | None = None
@@ -246,22 +238,11 @@ class Solution:
         y, single = as_points(points), polarisation is not None
         currents = self._polarised("conductor_current", incidence, polarisation)
         found = currents.on_body(y)
+        pairs = zip(columns_of(found.values), columns_of(found.error), strict=True)
+        columns = [measured_field(J, error, "equation", lit=found.lit) for J, error in pairs]
         charge = currents.charge_on_body(y, found.values)
-        lit = found.lit[:, None, None]
-
-        def lanes(values: np.ndarray) -> Any:
-            return by_polarisation(list(np.moveaxis(values, -1, 0)), y.shape[:-1], single=single)
-
-        return ConductorCurrent(
-            **self._vector_lanes(
-                y, np.linalg.norm(found.values, axis=1), found.error, single, currents.incident_electric
-            ),
-            values=lanes(found.values),
-            charge=lanes(charge[0]),
-            charge_error=lanes(charge[1]),
-            lit=lanes(np.where(lit, found.values, 0.0)),
-            creeping=lanes(np.where(lit, 0.0, found.values)),
-        )
+        facts = self._facts | {"incident_electric": _electric(currents, single)}
+        return vector_on_body(columns, charge, y, facts, single=single)
 
     def surface_field(self, points: ArrayLike, incidence: int = 0) -> SurfaceField:
         """u, or du/dn on a soft body, of one incidence at the surface points nearest to points (..., 3), L.
@@ -272,14 +253,10 @@ class Solution:
             If the boundary is "pec".
         """
         self._scalar("surface_field")
-        y = as_points(points)
-        currents, unit = self.currents(incidence), self.wavenumber if self._kind.kind == "soft" else 1.0
-        found = currents.on_body(y)
-        lanes = self._lanes(y, found.values, found.error, unit)
-        lit, nothing = found.lit.reshape(y.shape[:-1]), np.zeros_like(lanes["values"])
-        return SurfaceField(
-            **lanes, lit=np.where(lit, lanes["values"], nothing), creeping=np.where(lit, nothing, lanes["values"])
-        )
+        y, unit = as_points(points), self.wavenumber if self._kind.kind == "soft" else 1.0
+        found = self.currents(incidence).on_body(y)
+        field = measured_field(found.values, found.error, "equation", lit=found.lit)
+        return scalar_on_body(field, y, unit, self._facts)
 
     def _on(self, x: FloatArray) -> BoolArray:
         """Whether points (m, 3), L, are on the body (m,); none may be inside."""
@@ -310,37 +287,17 @@ class Solution:
             other = "conductor_current" if name == "surface_field" else "conductor_field"
             raise InvalidInputError(f"{name} is of scalar fields; a conductor has {other}")
 
-    def _vector_lanes(
-        self, points: FloatArray, size: FloatArray, error: FloatArray, single: bool, electric: ComplexArray
-    ) -> dict[str, Any]:
-        """What E and H of sizes (m, p) at points (..., 3) have in common."""
-        shape, by = points.shape[:-1], np.full(size.shape, "extinction")
-        status = judged(np.full(size.shape, int(FieldStatus.OK)), size, error, by, 1.0)
-        each = {"error": error, "error_by": by, "status": status, "method": np.full(size.shape, "equation")}
-        lanes = {name: by_polarisation(list(values.T), shape, single=single) for name, values in each.items()}
-        return lanes | {
-            "points": points.copy(),
-            "incident_electric": electric[:, 0] if single else electric,
+    @property
+    def _facts(self) -> dict[str, Any]:
+        """What results at points say of it."""
+        return {
             "wavenumber": self.wavenumber,
             "boundary": boundary_name(self.boundary),
             "order": 2,
             "length_unit": unit_of(self.body),
         }
 
-    def _lanes(self, points: FloatArray, values: ComplexArray, error: FloatArray, unit: float) -> dict[str, Any]:
-        """What fields at points (..., 3) have in common."""
-        shape = points.shape[:-1]
-        by = np.full(len(values), "extinction")
-        status = judged(np.full(len(values), int(FieldStatus.OK)), values, error, by, unit)
-        return {
-            "points": points.copy(),
-            "values": values.reshape(shape),
-            "error": error.reshape(shape),
-            "error_by": by.reshape(shape),
-            "status": status.reshape(shape),
-            "method": np.full(shape, "equation"),
-            "wavenumber": self.wavenumber,
-            "boundary": boundary_name(self.boundary),
-            "order": 2,
-            "length_unit": unit_of(self.body),
-        }
+
+def _electric(currents: ConductorTileCurrents, single: bool) -> ComplexArray:
+    """E0 (3, p), or (3,) of a single one."""
+    return currents.incident_electric[:, 0] if single else currents.incident_electric

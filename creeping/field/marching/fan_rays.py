@@ -30,7 +30,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.field.arguments import checked_plain
-from creeping.field.boundary import HARD, Boundary
+from creeping.field.boundary import Boundary
 from creeping.field.marching.profile import LEAST_NODES, RayProfiles
 from creeping.field.waves.far_geometry import fan_strips
 from creeping.field.waves.shed_wave import smoothstep
@@ -61,20 +61,14 @@ OWN = 1e-12
 """Relative tolerance of the way from the lattice to a joint."""
 
 
-def fan_profiles(
-    fan: RayFan, *, length: float | None = None, behind: float | None = None, boundary: Boundary = HARD
-) -> RayProfiles:
-    """Profiles of all rays of a fan.
+def fan_profiles(fan: RayFan, boundary: Boundary) -> RayProfiles:
+    """Profiles of all rays of a fan, from as far back on the lit side as the march starts.
 
     Parameters
     ----------
     fan : RayFan
         Of a body without a speed.
-    length : float, L, optional
-        Of the rays; that of the fan if not given.
-    behind : float, L, optional
-        How far the profiles go back on the lit side.
-    boundary : Boundary, optional
+    boundary : Boundary
         Whose admittance is taken along, if it varies.
 
     Returns
@@ -95,11 +89,10 @@ def fan_profiles(
     jointed = is_piecewise(body)
     # beyond a joint rays may be straighter than their neighbours
     typical = np.max if jointed else np.median
-    back = float(typical(BEHIND / np.maximum(kappa, least))) if behind is None else behind
-    ahead = fan.length if length is None else length
+    back = float(typical(BEHIND / np.maximum(kappa, least)))
     sharpest = max(float(np.max(np.abs(fan.curvature))), least)
     ways = []
-    for way, sense in ((back, -1.0), (ahead, 1.0)):
+    for way, sense in ((back, -1.0), (fan.length, 1.0)):
         count = int(np.clip(np.ceil(way * sharpest / TURN), FEWEST, MOST))
         times = np.linspace(0, way, count + 1)
         begin = pack(x0, sense * p0, jacobi=True)

@@ -15,24 +15,27 @@ Both go together as `creeping.field.waves.beams` says.
 Sources: [P82]; Derivations, F22 and F24.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from weakref import WeakKeyDictionary
+from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import RectBivariateSpline
 
-from creeping._typing import BoolArray, ComplexArray, FloatArray, IntArray
+from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
 from creeping.field.marching.fan_rays import FLAT, fan_profiles, wide_rows
 from creeping.field.marching.layer import MarchedRays, march_rays
 from creeping.field.marching.plan import MarchStatus
-from creeping.field.waves.beams import STRONG, beams_beside_rays, blended_sum, variation
+from creeping.field.results.point_result import columns_of
+from creeping.field.waves.beams import STRONG, Components, beams_beside_rays, blended_sum, variation, wide
 from creeping.field.waves.far_geometry import fan_strips
 from creeping.field.waves.gaussian_beams import MOST_TURNED
 from creeping.field.waves.ray_sums import RaySum
 from creeping.field.waves.strip_waves import StripTable, around, modes_on_strip
+from creeping.geometry.memo import memo_of
 from creeping.geometry.piecewise import has_edges, is_piecewise
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan
@@ -52,10 +55,6 @@ TWISTED = 0.4
 FAVOUR = {"electric hard": 0.5}
 """How much more the error of modes counts than that of the march, 1 if not named: measured against the equation on
 three ellipsoids and a sphere, k = 10 and 20, among 0.05 to 2."""
-_WAVES: "WeakKeyDictionary[RayFan, dict[tuple[float, Boundary], FanWaves]]" = WeakKeyDictionary()
-
-LONGEST = 60.0
-"""Seconds that beams may take."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,60 +212,76 @@ def marchable(fan: RayFan, boundary: Boundary, order: int, fewest: int = FEWEST_
 
 def fan_waves(fan: RayFan, *, wavenumber: float, boundary: Boundary) -> FanWaves:
     """Marched waves of a fan, made once for each of the last wavenumbers and boundaries."""
-    kept = _WAVES.setdefault(fan, {})
-    key = (wavenumber, boundary)
-    if key not in kept:
-        while len(kept) >= KEPT:
-            kept.pop(next(iter(kept)))
-        marched = march_rays(fan_profiles(fan, boundary=boundary), wavenumber=wavenumber, boundary=boundary)
+
+    def make() -> FanWaves:
+        marched = march_rays(fan_profiles(fan, boundary), wavenumber=wavenumber, boundary=boundary)
         times = np.linspace(0.0, fan.length, int(np.max(marched.counts, initial=FEWEST)) + 1)
         ends = np.where(np.isin(fan.status, AT_CREASES), fan.detachment, np.inf)
         alone = march_alone(fan.body, boundary)
-        kept[key] = FanWaves(fan_strips(fan), wide_rows(fan), marched, times, boundary, alone, ends)
-    return kept[key]
+        return FanWaves(fan_strips(fan), wide_rows(fan), marched, times, boundary, alone, ends)
+
+    return memo_of(fan, "marched waves", (wavenumber, boundary), make, KEPT)
 
 
-def marches(fan: RayFan, boundary: Boundary, order: int, count: int, wavenumber: float) -> bool:
-    """Whether the waves of a fan can be marched, and cost little enough at ``count`` points."""
-    from creeping.field.waves.beams import seconds
+class OnRays(NamedTuple):
+    """Waves of rays found (m,), but for their tubes.
 
-    return marchable(fan, boundary, order) and seconds(fan, fan_strips(fan), wavenumber, count) < LONGEST
+    Attributes
+    ----------
+    values : (m,) or (m, 3, p) complex
+    size, part : (m,) or (m, p)
+        Size of each, at least that of the marched wave, and its error as a share of that.
+    """
+
+    values: ComplexArray
+    size: FloatArray
+    part: FloatArray
 
 
-def marched_sum(
+def scalar_on_rays(waves: FanWaves, shed: ShedRays) -> OnRays:
+    """Y of the rays found (m,)."""
+    y, off = at_shed(shed, len(waves.strips), waves.at, waves.error)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return OnRays(y, np.abs(y), np.where(np.abs(y) > 0, off / np.abs(y), 0.0))
+
+
+def at_shed(shed: ShedRays, strips: int, *functions: Callable[[int, FloatArray, FloatArray], Any]) -> list[Any]:
+    """Functions of places sigma, s of a strip at the rays found (m,): (m, ...) each."""
+    rows = [np.flatnonzero(shed.strip == number) for number in range(strips)]
+    places = [(number, shed.sigma[mine], shed.rays.time[mine]) for number, mine in enumerate(rows)]
+    back = np.argsort(np.concatenate(rows))
+    return [np.concatenate([of(*place) for place in places])[back] for of in functions]
+
+
+def marched_sums(
     fan: RayFan,
+    waves: FanWaves,
     shed: ShedRays,
     points: FloatArray,
-    share: FloatArray | None,
+    share: FloatArray,
     young: BoolArray,
-    wavenumber: float,
-    boundary: Boundary,
-) -> RaySum:
-    """Sum of the marched waves at points (n, 3), L.
+    of: OnRays,
+    components: Components | None = None,
+) -> list[RaySum]:
+    """Sums of marched waves at points (n, 3), L, one, or one of each polarisation.
 
-    ``share`` (n,) is that of the rays next to the line, of which ``young`` (m,) says which of the rays found they are.
+    ``waves`` are those that beams are made of, for a vector with ``components``; ``of`` says what the rays found (m,)
+    bring. ``share`` (n,) is that of the rays next to the line, of which ``young`` (m,) says which they are.
     """
-    k, count = wavenumber, len(points)
-    waves = fan_waves(fan, wavenumber=k, boundary=boundary)
-    y, slope, off = _on_rays(waves, shed)
-    rays, observer = shed.rays, shed.observer
-    own = spread_out(y, rays, k)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        part = np.where(np.abs(y) > 0, off / np.abs(y), 0.0)
-    share = np.ones(count) if share is None else share
+    k, observer, count = waves.wavenumber, shed.observer, len(points)
     # an infinite wave is that of a caustic: beams serve there
-    own = np.where(np.isfinite(own), own, 0.0) * np.where(young, share[observer], 1.0)
-    size = np.minimum(np.abs(own), STRONG * np.abs(y))
-    beams = beams_beside_rays(fan, waves, shed, points, own, share)
-    return blended_sum(fan, shed, own, np.abs(own), size, part, variation(fan, shed, y, slope, k), beams, k, boundary)
-
-
-def _on_rays(waves: FanWaves, shed: ShedRays) -> tuple[ComplexArray, ComplexArray, FloatArray]:
-    """Y, dy/dsigma and the error of y of the rays found (m,)."""
-    y, slope = np.zeros((2, len(shed.sigma)), dtype=complex)
-    error = np.zeros(len(shed.sigma))
-    for number in range(len(waves.strips)):
-        mine = np.flatnonzero(shed.strip == number)
-        at = number, shed.sigma[mine], shed.rays.time[mine]
-        y[mine], slope[mine], error[mine] = waves.at(*at), waves.across(*at), waves.error(*at)
-    return y, slope, error
+    tube = spread_out(np.ones(len(observer), dtype=complex), shed.rays, k)
+    tube = np.where(np.isfinite(tube), tube, 0.0) * np.where(young, share[observer], 1.0)
+    own = wide(tube, of.values) * of.values
+    flat = own.reshape(len(own), int(np.prod(own.shape[1:]))) if own.ndim > 1 else own
+    sums = beams_beside_rays(fan, waves, shed, points, flat, share, components)
+    sides = (columns_of(one.reshape(count, *own.shape[1:])) for one in sums)
+    y, slope = at_shed(shed, len(waves.strips), waves.at, waves.across)
+    eta, found = variation(fan, shed, y, slope, k), []
+    for wave, size, part, *beams in zip(*(columns_of(one) for one in (own, of.size, of.part)), *sides, strict=True):
+        strength = np.abs(tube) * size
+        bounded = np.minimum(strength, STRONG * size)
+        found.append(
+            blended_sum(fan, shed, wave, strength, bounded, part, eta, (beams[0], beams[1]), k, waves.boundary)
+        )
+    return found

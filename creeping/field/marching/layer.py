@@ -69,8 +69,6 @@ PER_OCTAVE = 8
 DEGREE = 7
 _LONG = 1 << 40
 """Denominator of the tabulated delta: exact and short."""
-Gauss = tuple[Fraction, Fraction]
-"""Rational complex number."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -405,7 +403,7 @@ def rational_step(delta: FloatArray) -> tuple[ComplexArray, ComplexArray]:
 def tabulated_step(node: int) -> ComplexArray:
     """Poles and weights (2, ORDER) of delta = 2^(node/PER_OCTAVE)."""
     delta = Fraction(round(2.0 ** (node / PER_OCTAVE) * _LONG), _LONG)
-    numerator, denominator = _pade(_taylor(delta, 2 * ORDER))
+    numerator, denominator = _pade(*_taylor(delta, 2 * ORDER))
     zeros = np.roots(denominator[::-1])
     poles = -1 / zeros
     order = np.argsort(-poles.real)
@@ -415,54 +413,44 @@ def tabulated_step(node: int) -> ComplexArray:
     return np.stack([poles, np.polyval(numerator[::-1], zeros) / np.prod(others, axis=1)])
 
 
-def _taylor(delta: Fraction, count: int) -> list[Gauss]:
-    """Coefficients of exp{i delta (sqrt(1 + X) - 1)}: with g its exponent, j e_j = sum_i i g_i e_(j-i)."""
-    root, exponent = Fraction(1), [Fraction(0)]
+def _taylor(delta: Fraction, count: int) -> tuple[list[Fraction], list[Fraction]]:
+    """Real and imaginary parts of the coefficients of exp{i delta (sqrt(1 + X) - 1)}.
+
+    With i g its exponent, j e_j = i sum_i i g_i e_(j-i).
+    """
+    root, g = Fraction(1), [Fraction(0)]
     for j in range(1, count):
         root *= (Fraction(3, 2) - j) / j
-        exponent.append(delta * root)
-    series: list[Gauss] = [(Fraction(1), Fraction(0))]
+        g.append(delta * root)
+    real, imaginary = [Fraction(1)], [Fraction(0)]
     for j in range(1, count):
-        real = -sum((i * exponent[i] * series[j - i][1] for i in range(1, j + 1)), Fraction(0))
-        imaginary = sum((i * exponent[i] * series[j - i][0] for i in range(1, j + 1)), Fraction(0))
-        series.append((real / j, imaginary / j))
-    return series
+        parts = [sum((i * g[i] * of[j - i] for i in range(1, j + 1)), Fraction(0)) / j for of in (real, imaginary)]
+        real.append(-parts[1])
+        imaginary.append(parts[0])
+    return real, imaginary
 
 
-def _pade(series: list[Gauss]) -> tuple[ComplexArray, ComplexArray]:
+def _pade(real: list[Fraction], imaginary: list[Fraction]) -> tuple[ComplexArray, ComplexArray]:
     """Numerator (p) and denominator (p + 1) of [p-1/p], lowest powers first, of 2p Taylor coefficients."""
-    p = len(series) // 2
-    rows = [
-        [*(series[m - i] for i in range(1, p + 1)), _times((Fraction(-1), Fraction(0)), series[m])]
-        for m in range(p, 2 * p)
+    p = len(real) // 2
+    # sum_i s_(m-i) b_i = -s_m, i from 1 on: real parts of b are the first p unknowns, imaginary ones the others
+    rows = []
+    for m in range(p, 2 * p):
+        re, im = ([of[m - i] for i in range(1, p + 1)] for of in (real, imaginary))
+        rows += [[*re, *(-x for x in im), -real[m]], [*im, *re, -imaginary[m]]]
+    A = np.array(rows, dtype=object)
+    for column in range(2 * p):
+        pivot = column + int(np.flatnonzero(A[column:, column])[0])
+        A[[column, pivot]] = A[[pivot, column]]
+        A[column, column:] = A[column, column:] / A[column, column]
+        others = np.arange(2 * p) != column
+        A[others, column:] -= np.outer(A[others, column], A[column, column:])
+    re, im = [Fraction(1), *A[:p, -1]], [Fraction(0), *A[p:, -1]]
+    numerator = [
+        complex(
+            sum(re[i] * real[m - i] - im[i] * imaginary[m - i] for i in range(m + 1)),
+            sum(re[i] * imaginary[m - i] + im[i] * real[m - i] for i in range(m + 1)),
+        )
+        for m in range(p)
     ]
-    for column in range(p):
-        pivot = next(r for r in range(column, p) if any(rows[r][column]))
-        rows[column], rows[pivot] = rows[pivot], rows[column]
-        head = rows[column][column]
-        size = head[0] ** 2 + head[1] ** 2
-        rows[column] = [_times(value, (head[0] / size, -head[1] / size)) for value in rows[column]]
-        for r in range(p):
-            if r != column:
-                rows[r] = [
-                    _minus(value, _times(rows[r][column], other))
-                    for value, other in zip(rows[r], rows[column], strict=True)
-                ]
-    denominator: list[Gauss] = [(Fraction(1), Fraction(0)), *(row[p] for row in rows)]
-    numerator = []
-    for m in range(p):
-        total: Gauss = (Fraction(0), Fraction(0))
-        for i in range(m + 1):
-            total = _minus(total, _times((Fraction(-1), Fraction(0)), _times(denominator[i], series[m - i])))
-        numerator.append(total)
-    return np.array([complex(*map(float, v)) for v in numerator]), np.array(
-        [complex(*map(float, v)) for v in denominator]
-    )
-
-
-def _times(a: Gauss, b: Gauss) -> Gauss:
-    return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]
-
-
-def _minus(a: Gauss, b: Gauss) -> Gauss:
-    return a[0] - b[0], a[1] - b[1]
+    return np.array(numerator), np.array([complex(*of) for of in zip(re, im, strict=True)])

@@ -66,21 +66,6 @@ class MarchStatus(IntEnum):
     UNSTABLE = 5
     """The march did not stay finite: there is no wave."""
 
-    @property
-    def remedy(self) -> str:
-        """What to do about it."""
-        return _REMEDIES[self]
-
-
-_REMEDIES = {
-    MarchStatus.OK: "none needed",
-    MarchStatus.SHARP: "take a higher wavenumber, or round the edge off",
-    MarchStatus.DEEP: "none by marching: the wave leaves one part of the body for another",
-    MarchStatus.UNLIT: "begin the profile further back on the lit side",
-    MarchStatus.HOLLOW: "none by marching: the error may be several times that stated",
-    MarchStatus.UNSTABLE: "give the curvature on more nodes",
-}
-
 
 @dataclass(frozen=True, eq=False)
 class MarchPlan:

@@ -6,7 +6,6 @@ Both incident polarisations, theta and phi, have the last axis of vectors, error
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,13 +13,17 @@ import numpy as np
 
 from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.field.results.labelled import ArrayResult
-from creeping.field.results.point_result import PointData
+from creeping.field.results.point_result import PointData, PointValues, by_polarisation, stated
 
 if TYPE_CHECKING:
     import xarray
 
 PARTS = ("incident", "scattered", "creeping")
 """Parts of a field near a conductor."""
+ON_BODY = {"values": "values", "lit": "wave", "creeping": "creeping"}
+"""What parts of a current are of `PointValues`."""
+E, H = slice(0, 3), slice(3, 6)
+"""Where both fields stand among six components."""
 
 
 class Fields(NamedTuple):
@@ -168,7 +171,32 @@ class ConductorCurrent(ArrayResult, PointData):
         return vector_dataset(self, parts | {"charge_error": self.charge_error})
 
 
-def by_polarisation(values: Sequence[np.ndarray], shape: tuple[int, ...], *, single: bool) -> Any:
-    """Values (n, ...) of each polarisation at points of a shape: (*shape, ...), or (*shape, ..., p) unless single."""
-    each = [one.reshape((*shape, *one.shape[1:])) for one in values]
-    return each[0] if single else np.stack(each, axis=-1)
+def vector_near(
+    columns: list[PointValues], points: FloatArray, incident: ComplexArray, facts: dict[str, Any], *, single: bool
+) -> ConductorField:
+    """E and H of each polarisation at points (..., 3), judged, in the parts that a reader wants.
+
+    ``incident`` (n, 6, p) is the incident wave there.
+    """
+    shape = points.shape[:-1]
+    each = [one.parts(incident[..., i]) for i, one in enumerate(columns)]
+    parts: dict[str, Any] = {
+        name: Fields(*(by_polarisation([v[:, half] for v in lanes], shape, single=single) for half in (E, H)))
+        for name, lanes in zip(PARTS, zip(*each, strict=True), strict=True)
+    }
+    return ConductorField(**parts, **stated(columns, points, 1.0, single=single), **facts)
+
+
+def vector_on_body(
+    columns: list[PointValues],
+    charge: tuple[ComplexArray, FloatArray],
+    points: FloatArray,
+    facts: dict[str, Any],
+    *,
+    single: bool,
+) -> ConductorCurrent:
+    """J of each polarisation, and n.E with its error (n, p), at points of the body (..., 3), judged."""
+    lanes = {name: [getattr(one, of) for one in columns] for name, of in ON_BODY.items()}
+    lanes |= {name: list(values.T) for name, values in zip(("charge", "charge_error"), charge, strict=True)}
+    named = {name: by_polarisation(values, points.shape[:-1], single=single) for name, values in lanes.items()}
+    return ConductorCurrent(**named, **stated(columns, points, 1.0, single=single), **facts)

@@ -10,6 +10,7 @@ Sources: Derivations, F20.
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from enum import IntEnum
 from typing import TYPE_CHECKING
@@ -300,9 +301,26 @@ class PointValues:
         """Sum of the parts (n,)."""
         return np.asarray(self.wave + self.creeping)
 
+    @property
+    def magnitude(self) -> FloatArray:
+        """|values| (n,); of E and H the larger one's."""
+        size = np.abs(self.values)
+        if size.ndim == 1:
+            return np.asarray(size)
+        return np.asarray(np.linalg.norm(size.reshape(len(size), size.shape[1] // 3, 3), axis=2).max(axis=1))
+
     def __getitem__(self, at: IntArray | BoolArray) -> PointValues:
         """Some of the points."""
         return PointValues(*(getattr(self, one.name)[at] for one in fields(self)))
+
+    def parts(self, incident: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """The incident wave (n, ...), what it excites, and creeping rays: they add up to the values.
+
+        There is no incident wave apart where rays alone have the whole field, or nothing has.
+        """
+        alone = np.isin(self.method, ("rays", "boundary", "none")).reshape(-1, *(1,) * (incident.ndim - 1))
+        incident = np.where(alone, 0.0, incident)
+        return incident, self.wave - incident, self.creeping
 
     def put(self, at: IntArray, other: PointValues) -> PointValues:
         """Another field in place of this one at the points ``at``."""
@@ -329,6 +347,40 @@ class PointValues:
         return self.put(at[better], other[better])
 
 
+def columns_of(values: np.ndarray[Any, Any]) -> list[np.ndarray[Any, Any]]:
+    """Arrays of a scalar problem (n,), or of each polarisation of a conductor's (n, ..., p)."""
+    return [values] if values.ndim == 1 else list(np.moveaxis(values, -1, 0))
+
+
+def by_polarisation(values: Sequence[np.ndarray[Any, Any]], shape: tuple[int, ...], *, single: bool) -> Any:
+    """Values (n, ...) of each polarisation at points of a shape: (*shape, ...), or (*shape, ..., p) unless single."""
+    each = [one.reshape((*shape, *one.shape[1:])) for one in values]
+    return each[0] if single else np.stack(each, axis=-1)
+
+
+def stated(columns: list[PointValues], points: FloatArray, unit: float, *, single: bool = True) -> dict[str, Any]:
+    """What results at points (..., 3) have in common, of the field of each polarisation, judged by its ``unit``."""
+    lanes = {name: [getattr(one, name) for one in columns] for name in ("error", "error_by", "method")}
+    lanes["status"] = [judged(one.status, one.magnitude, one.error, one.error_by, unit) for one in columns]
+    shape = points.shape[:-1]
+    found = {name: by_polarisation(values, shape, single=single) for name, values in lanes.items()}
+    return found | {"points": points.copy()}
+
+
+def scalar_near(field: PointValues, points: FloatArray, incident: ComplexArray, facts: dict[str, Any]) -> NearField:
+    """The field at points (..., 3), judged, in the parts that a reader wants."""
+    shape = points.shape[:-1]
+    parts = [one.reshape(shape) for one in field.parts(incident)]
+    names: dict[str, Any] = dict(zip(("incident", "scattered", "creeping"), parts, strict=True))
+    return NearField(values=np.asarray(sum(parts)), **names, **stated([field], points, 1.0), **facts)
+
+
+def scalar_on_body(field: PointValues, points: FloatArray, unit: float, facts: dict[str, Any]) -> SurfaceField:
+    """The field at points of the body (..., 3), judged by its ``unit``."""
+    values, lit, creeping = (one.reshape(points.shape[:-1]) for one in (field.values, field.wave, field.creeping))
+    return SurfaceField(values=values, lit=lit, creeping=creeping, **stated([field], points, unit), **facts)
+
+
 def zero_field(count: int, method: str) -> PointValues:
     """The field 0, exactly: u on a soft body."""
     nothing = np.zeros(count, dtype=complex)
@@ -336,13 +388,20 @@ def zero_field(count: int, method: str) -> PointValues:
     return PointValues(nothing, nothing, np.zeros(count), np.full(count, "expansion"), status, np.full(count, method))
 
 
-def measured_field(values: ComplexArray, error: FloatArray, method: str, error_by: str) -> PointValues:
-    """Field of currents (n,); where its error is not known nothing is but the size of the wave."""
+def measured_field(
+    values: ComplexArray, error: FloatArray, method: str, error_by: str = "extinction", lit: BoolArray | None = None
+) -> PointValues:
+    """Field of currents (n, ...); where its error is not known nothing is but the size of the wave.
+
+    On the body it is the lit side's part where that is ``lit`` (n,), else that of rays.
+    """
     known = np.isfinite(error)
     status = np.where(known, FieldStatus.OK, FieldStatus.UNRESOLVED).astype(np.int64)
+    bright = np.ones(len(values), dtype=bool) if lit is None else lit
+    bright = bright.reshape(-1, *(1,) * (values.ndim - 1))
     return PointValues(
-        wave=values,
-        creeping=np.zeros_like(values),
+        wave=np.where(bright, values, 0.0),
+        creeping=np.where(bright, 0.0, values),
         error=np.where(known, error, 1.0),
         error_by=np.where(known, error_by, "bound"),
         status=status,

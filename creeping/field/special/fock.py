@@ -107,14 +107,19 @@ def _by_path(which: str, xi: FloatArray, q: ComplexArray | None, power: int) -> 
         phase = 1j * xi[part, None] * path.t
         if which == "pekeris":
             terms = above / below * np.exp(phase + path.fall - path.rise)
-        elif which == "slope":
-            terms = turned / below**2 * np.exp(phase + 2 * path.fall)
-        elif which == "surface":
-            terms = -turned / below * np.exp(phase + path.fall)
         else:
-            terms = -turned * path.lower / below**2 * np.exp(phase + path.fall)
+            terms = turned * _others(which, phase, path.lower, below, path.fall)
         out[part] = terms @ (path.weight * path.t**power) / np.sqrt(np.pi)
     return out
+
+
+def _others(
+    which: str, phase: ComplexArray, lower: ComplexArray, below: ComplexArray, fall: ComplexArray
+) -> ComplexArray:
+    """What the integrals of all but p* have at their nodes, with w1 = ``lower`` and w1' - q w1 = ``below`` scaled."""
+    if which == "slope":
+        return np.asarray(1 / below**2 * np.exp(phase + 2 * fall))
+    return np.asarray(-(1 if which == "surface" else lower / below) / below * np.exp(phase + fall))
 
 
 def boundary_modes(q: ComplexArray | float | None, n: int = MODES) -> Modes:
@@ -244,12 +249,8 @@ def _by_descent(which: str, xi: FloatArray, q: ComplexArray | None, power: int) 
             upper, upper_slope, rise = scaled_w2(t)
             above = upper if q is None else upper_slope - q[part, None] * upper
             terms = above / below * np.exp(1j * x * t + fall - rise)
-        elif which == "slope":
-            terms = 1 / below**2 * np.exp(1j * x * t + 2 * fall)
-        elif which == "surface":
-            terms = -1 / below * np.exp(1j * x * t + fall)
         else:
-            terms = -lower / below**2 * np.exp(1j * x * t + fall)
+            terms = _others(which, 1j * x * t, lower, below, fall)
         out[part] = np.sum(terms * t**power, axis=1) * step[:, 0] * np.exp(0.75j * np.pi) / np.sqrt(np.pi)
     return out + pole(xi, power) if which == "pekeris" else out
 

@@ -30,7 +30,7 @@ from typing import Protocol
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from creeping._typing import BoolArray, ComplexArray, FloatArray
+from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
 from creeping.field.arguments import fock_parameter
 from creeping.field.boundary import Boundary
 from creeping.field.results.point_result import FieldStatus
@@ -216,8 +216,8 @@ def beams_beside_rays(
 ) -> tuple[ComplexArray, ComplexArray]:
     """Sums of beams of both widths at points (n, 3), the waves ``own`` (m, ...) of young rays with them: (n, ...)."""
     near, clear = _apart_from_line(fan, shed, waves.wavenumber, len(points))
-    alone = total_of(np.where(_wide(near, own), own, 0.0), shed.observer, len(points))
-    clear, share = _wide(clear, alone), _wide(share, alone)
+    alone = total_of(np.where(wide(near, own), own, 0.0), shed.observer, len(points))
+    clear, share = wide(clear, alone), wide(share, alone)
 
     def together(sums: BeamSums) -> ComplexArray:
         early, late = sums.early.reshape(alone.shape), sums.late.reshape(alone.shape)
@@ -282,7 +282,7 @@ def _blended(
     e_r = np.sqrt(e_r**2 + np.maximum(0.0, magnitude(by_beams - by_rays, plain) ** 2 - (2 * e_b) ** 2))
     both = e_r**2 + e_b**2
     with np.errstate(invalid="ignore", divide="ignore"):
-        beta = _wide(np.where(both > 0, e_r**2 / both, 0.0), by_beams)
+        beta = wide(np.where(both > 0, e_r**2 / both, 0.0), by_beams)
         rest = np.where(both > 0, e_r * e_b / np.sqrt(both), 0.0)
     return np.asarray((1 - beta) * by_rays + beta * by_beams), rest
 
@@ -321,9 +321,9 @@ def _judged(
     return RaySum(values, error, status.astype(np.int64), total_of(np.exp(-decay * xi), observer, count))
 
 
-def _wide(values: FloatArray | BoolArray, like: ComplexArray) -> FloatArray:
+def wide(values: FloatArray | BoolArray | ComplexArray, like: ComplexArray) -> Any:
     """Values (n,) with as many axes as ``like`` (n, ...)."""
-    return np.asarray(values, dtype=float).reshape(-1, *(1,) * (like.ndim - 1))
+    return np.asarray(values).reshape(-1, *(1,) * (like.ndim - 1))
 
 
 def _apart_from_line(fan: RayFan, shed: ShedRays, k: float, count: int) -> tuple[BoolArray, FloatArray]:

@@ -18,7 +18,7 @@ Sources: [LK59] for the caustic; Derivations, F19.
 
 from collections.abc import Callable
 from functools import cached_property
-from weakref import WeakKeyDictionary, ref
+from weakref import ref
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -32,7 +32,7 @@ from creeping.geodesics.states import END, WITH_END, WITH_JACOBI
 from creeping.geometry.curvature import ParabolicPoints, parabolic_points
 from creeping.geometry.directions import first_of_equals
 from creeping.geometry.evaluators import evaluators
-from creeping.geometry.memo import memo
+from creeping.geometry.memo import memo, memo_of
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface, normal, size
 from creeping.geometry.triangulation import Triangulation
@@ -51,8 +51,6 @@ from creeping.shadow.nodes import prepared
 from creeping.shadow.status import ATTACHED, NO_RAY
 from creeping.storage.memory import within_budget
 
-_KEPT: "WeakKeyDictionary[RayFan, tuple[bytes, FarGeometry]]" = WeakKeyDictionary()
-_STRIPS: "WeakKeyDictionary[RayFan, tuple[Strip, ...]]" = WeakKeyDictionary()
 AT_ONCE = 20_000_000
 """Samples of rays, times observers, that are searched before signals are heard: 0.1 s."""
 CELLS = (64, 2048)
@@ -76,26 +74,23 @@ LARGEST = 0.5357
 """Largest value of Ai."""
 
 
-def fan_strips(fan: RayFan, *, single: bool = False) -> tuple[Strip, ...]:
-    """Strips of a fan, made once; those of a single ray, which have nothing to interpolate, on request."""
-    if fan not in _STRIPS:
-        _STRIPS[fan] = strips_of(fan)
-    return tuple(strip for strip in _STRIPS[fan] if single or len(strip.positions) > 1)
+def fan_strips(fan: RayFan) -> tuple[Strip, ...]:
+    """Strips of a fan, made once, but those of a single ray, which have nothing to interpolate."""
+    return memo(fan, "strips", lambda: tuple(strip for strip in strips_of(fan) if len(strip.positions) > 1))
 
 
 def far_geometry(fan: RayFan, observation: ArrayLike) -> "FarGeometry":
     """Geometry of a fan for directions (..., 3), kept with the fan until other directions are asked for."""
     r = observers_of(observation)
-    key = r.tobytes()
-    kept = _KEPT.get(fan)
-    if kept is None or kept[0] != key:
+
+    def make() -> FarGeometry:
         tracer = RayTracer(fan.body, fan.length)
         # not the fan itself: this is kept as long as the fan lives
         line, make = fan.line, _forward_parts(fan)
         attached = np.array([(line.fractions if is_piecewise(line.body) else shares_of(line))["attached"]])
-        geometry = FarGeometry(fan.flow, launched_by(fan), tracer, r[None], attached, lambda _: (line, make()))
-        _KEPT[fan] = kept = (key, geometry)
-    return kept[1]
+        return FarGeometry(fan.flow, launched_by(fan), tracer, r[None], attached, lambda _: (line, make()))
+
+    return memo_of(fan, "far geometry", r.tobytes(), make, 1)
 
 
 def _forward_parts(fan: RayFan) -> "Callable[[], tuple[Strip, ...]]":

@@ -15,6 +15,8 @@ and what is beyond the second order of each ray, 3 |f2 - f1|^2/|f2|, of a specul
 Sources: [LK59], [P79]; Derivations, F3, F10, F13 to F15. The thresholds of W and these factors were set by trial.
 """
 
+from typing import ClassVar
+
 import numpy as np
 
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
@@ -113,27 +115,34 @@ def held_rate(rays: RayPoints, m: FloatArray, passed: BoolArray) -> FloatArray:
 class Parts:
     """Weighted parts of the far field, summed contribution by contribution, and the squares of what each may be off."""
 
+    names: ClassVar[tuple[str, ...]] = ("creeping", "reflected", "forward")
+
     def __init__(self, geometry: FarGeometry, kinds: tuple[Boundary, ...], wavenumber: float, order: int) -> None:
-        self.geometry, self.wavenumber, self.order = geometry, wavenumber, order
-        self.incident = geometry.direction
-        self.vector = len(kinds) == 2
-        self.unsure = UNSURE if kinds[0].kind == "impedance" else 1.0
-        m = len(geometry.directions)
-        self.creeping, self.reflected, self.forward = (self._zeros() for _ in range(3))
-        self.doubt = self._zeros().real
-        self.sizes, self.failing_size, self.missing = np.zeros(m), np.zeros(m), np.zeros(m, dtype=bool)
+        self._begin(geometry, kinds, wavenumber, order)
         theta = geometry.angle
         m_theta = geometry.mean_root_radius * np.cbrt(wavenumber / 2) * theta
-        self.in_forward = 1 - smoothstep(m_theta, *FORWARD)
+        self.missing = np.zeros(len(theta), dtype=bool)
         self.beyond_axis = smoothstep(m_theta, *NEAR_AXIS)
         self.in_fan = np.where(theta > np.pi / 2, smoothstep(geometry.least_merging, *MERGED), 0.0)
         self.long_rays = self.in_forward * smoothstep(theta, *LONG_RAYS)
-        # of the worse polarisation
-        ends = [geometry.ends.lost(geometry.directions, geometry.incidence, wavenumber, kind) for kind in kinds]
-        lost, fold = np.max(ends, axis=0), geometry.fold(wavenumber)
-        self.left_out = (1 - self.in_forward) * np.hypot(lost, fold)
+        self.left_out = (1 - self.in_forward) * np.hypot(self.ended, geometry.fold(wavenumber))
         # ground behind the rest of the line has no wave: its share of a field that is nowhere in particular
         self.dark = geometry.unserved * geometry.typical
+
+    def _begin(self, geometry: FarGeometry, kinds: tuple[Boundary, ...], wavenumber: float, order: int) -> None:
+        """What all parts have in common."""
+        self.geometry, self.wavenumber, self.order = geometry, wavenumber, order
+        self.incident, self.vector = geometry.direction, len(kinds) == 2
+        self.unsure = UNSURE if kinds[0].kind == "impedance" else 1.0
+        m = len(geometry.directions)
+        self.creeping, self.reflected, self.forward = (self._zeros() for _ in range(3))
+        self.doubt, self.sizes, self.failing_size = self._zeros().real, np.zeros(m), np.zeros(m)
+        m_theta = geometry.mean_root_radius * np.cbrt(wavenumber / 2) * geometry.angle
+        self.in_forward = 1 - smoothstep(m_theta, *FORWARD)
+        # of the worse polarisation
+        ends = [geometry.ends.lost(geometry.directions, geometry.incidence, wavenumber, kind) for kind in kinds]
+        self.ended: FloatArray = np.max(ends, axis=0)
+        self.left_out, self.dark = np.zeros(m), np.zeros(m)
         # of the shed rays and of the specular points of the geometry, one of each for each polarisation
         self.shed_waves: list[ComplexArray] = []
         self.specular_waves: list[ComplexArray] = []
@@ -144,11 +153,12 @@ class Parts:
 
     def field(self, boundary: BoundaryLike) -> FarField:
         """The far field of all parts."""
+        parts = {name: getattr(self, name) for name in self.names}
         return FarField(
             directions=self.geometry.directions.copy(),
-            total=self.creeping + self.reflected + self.forward,
-            parts={"creeping": self.creeping, "reflected": self.reflected, "forward": self.forward},
-            method=_methods(self.in_forward, self.in_fan),
+            total=np.asarray(sum(parts.values())),
+            parts=parts,
+            method=self.methods(),
             unresolved=self.unresolved(),
             error=self.error(),
             error_by="order",
@@ -156,6 +166,10 @@ class Parts:
             boundary=boundary_name(boundary),
             order=self.order,
         )
+
+    def methods(self) -> np.ndarray[Any, np.dtype[np.str_]]:
+        """What serves in each direction (m,)."""
+        return _methods(self.in_forward, self.in_fan)
 
     def unresolved(self) -> BoolArray:
         """Directions in which an expansion fails, or something is left out, that matters there (m,)."""
@@ -180,13 +194,22 @@ class Parts:
 
     def add(self, number: int, kind: Boundary) -> None:
         """Add every part of one scalar problem."""
-        g, k = self.geometry, self.wavenumber
-        w, shed = self.in_forward, g.shed
+        g, w, shed = self.geometry, self.in_forward, self.geometry.shed
         share = ((1 - w) * (1 - self.in_fan))[shed.observer] + np.where(g.long, self.long_rays[shed.observer], 0.0)
-        first, second = (_weighted(share, wave) for wave in isolated_rays(g, k, kind))
+        self._add_rays(number, kind, share)
+        if np.any(self.in_fan > 0):
+            self._add_fan(number, kind)
+        self._add_reflected(number, kind)
+        if np.any(w > 0):
+            self._add_forward(number, kind)
+
+    def _add_rays(self, number: int, kind: Boundary, share: FloatArray) -> None:
+        """Add isolated rays (n,), each by a share."""
+        g, shed = self.geometry, self.geometry.shed
+        first, second = (_weighted(share, wave) for wave in isolated_rays(g, self.wavenumber, kind))
         # the first zero of J' is the launch point itself, where the forward lobe serves
         merged = (merging(shed.rays) > MERGED[1]) & passed_fold(g)
-        merged |= strong_coupling(shed.rays, k, kind)
+        merged |= strong_coupling(shed.rays, self.wavenumber, kind)
         normals = shed.rays.first_normal, g.shed_normals
         wave = second if self.order == 2 else first
         off = beyond(np.abs(second - first), wave, self.order, self.unsure)
@@ -194,11 +217,6 @@ class Parts:
             self._doubt_turning(shed, wave)
         each, doubts = (self._each(number, shed.observer, one, *normals) for one in (wave, off))
         self._add_apart(self.creeping, shed.observer, each, doubts, merged)
-        if np.any(self.in_fan > 0):
-            self._add_fan(number, kind)
-        self._add_reflected(number, kind)
-        if np.any(w > 0):
-            self._add_forward(number, kind)
 
     def _doubt_turning(self, shed: ShedRays, wave: ComplexArray) -> None:
         """Note what may pass from creeping waves (n,) of one polarisation into the other on their way."""

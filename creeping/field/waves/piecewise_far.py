@@ -45,15 +45,13 @@ from typing import NamedTuple
 import numpy as np
 
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
-from creeping.field.boundary import SOFT, Boundary, BoundaryLike, boundary_name, scalar_boundaries
+from creeping.field.boundary import SOFT, Boundary, BoundaryLike, scalar_boundaries
 from creeping.field.creeping_modes import fock_scale, modes_of
 from creeping.field.results.far_result import FarField, spherical_frame
-from creeping.field.waves.far_geometry import FarGeometry, far_geometry, merging
-from creeping.field.waves.far_rays import FORWARD, MERGED, UNSURE, Parts, beyond, isolated_rays, passed_fold
+from creeping.field.waves.far_geometry import FarGeometry, far_geometry
+from creeping.field.waves.far_rays import Parts
 from creeping.field.waves.likely_cells import parted
-from creeping.field.waves.ray_sums import strong_coupling
 from creeping.field.waves.reflected import plane_reflection
-from creeping.field.waves.shed_wave import smoothstep
 from creeping.geometry.curvature import curvature_norms
 from creeping.geometry.memo import memo
 from creeping.geometry.piecewise import Tiles, is_convex, pieces_of, tiles_of
@@ -103,36 +101,20 @@ def piecewise_far_field(fan: RayFan, r: FloatArray, k: float, boundary: Boundary
     parts = PiecewiseParts(fan, far_geometry(fan, r), kinds, k, order)
     for number, kind in enumerate(kinds):
         parts.add(number, kind)
-    return FarField(
-        directions=r.copy(),
-        total=parts.creeping + parts.reflected,
-        parts={"creeping": parts.creeping, "reflected": parts.reflected},
-        method=np.full(len(r), "rays+optics", dtype="<U16"),
-        unresolved=parts.unresolved(),
-        error=parts.error(),
-        error_by="order",
-        wavenumber=k,
-        boundary=boundary_name(boundary),
-        order=order,
-    )
+    return parts.field(boundary)
 
 
 class PiecewiseParts(Parts):
     """Parts of the field of one incidence, and what each may be off."""
 
+    names = ("creeping", "reflected")
+
     def __init__(
         self, fan: RayFan, geometry: FarGeometry, kinds: tuple[Boundary, ...], wavenumber: float, order: int
     ) -> None:
-        self.fan, self.geometry, self.wavenumber, self.order = fan, geometry, wavenumber, order
-        self.incident, self.vector = geometry.direction, len(kinds) == 2
-        self.unsure = UNSURE if kinds[0].kind == "impedance" else 1.0
+        self._begin(geometry, kinds, wavenumber, order)
+        self.fan = fan
         r, m, body = geometry.directions, len(geometry.directions), fan.body
-        self.creeping, self.reflected = (self._zeros() for _ in range(2))
-        self.doubt, self.sizes, self.failing_size = self._zeros().real, np.zeros(m), np.zeros(m)
-        self.shed_waves, self.specular_waves = [], []
-        theta = geometry.angle
-        self.in_forward = 1 - smoothstep(geometry.mean_root_radius * np.cbrt(wavenumber / 2) * theta, *FORWARD)
-        ends = [geometry.ends.lost(r, geometry.incidence, wavenumber, kind) for kind in kinds]
         typical = np.sqrt(tiles_of(body, 0.1).areas.sum() / (8 * np.pi))
         edges, facing = _edges(fan, r, wavenumber)
         # hidden ground, and faces that see each other, have waves that are nowhere in particular
@@ -144,7 +126,7 @@ class PiecewiseParts(Parts):
             ended,
             between * np.ones(m),
             tip_waves(fan, wavenumber) * np.ones(m),
-            (1 - self.in_forward) * np.max(ends, axis=0),
+            (1 - self.in_forward) * self.ended,
         ]
         self.specular = []
         side = side_of_tiles(body, wavenumber)
@@ -168,21 +150,7 @@ class PiecewiseParts(Parts):
 
     def add(self, number: int, kind: Boundary) -> None:
         """Add the creeping rays and the specular points of one scalar problem."""
-        g, shed = self.geometry, self.geometry.shed
-        share = (1 - self.in_forward)[shed.observer]
-        waves = []
-        for wave in isolated_rays(g, self.wavenumber, kind):
-            waves.append(np.where(share > 0, share * np.where(share > 0, wave, 0.0), 0.0))
-        merged = (merging(shed.rays) > MERGED[1]) & passed_fold(g)
-        merged |= strong_coupling(shed.rays, self.wavenumber, kind)
-        first, second = waves
-        wave = second if self.order == 2 else first
-        off = beyond(np.abs(second - first), wave, self.order, self.unsure)
-        if self.vector:
-            self._doubt_turning(shed, wave)
-        normals = shed.rays.first_normal, g.shed_normals
-        each, doubts = (self._each(number, shed.observer, one, *normals) for one in (wave, off))
-        self._add_apart(self.creeping, shed.observer, each, doubts, merged)
+        self._add_rays(number, kind, (1 - self.in_forward)[self.geometry.shed.observer])
         for points, by in self.specular:
             self._add_specular(number, kind, points, by)
 
@@ -203,11 +171,9 @@ class PiecewiseParts(Parts):
         lost = np.hypot(np.hypot(self.left_out, self.failing_size), self.dark)
         return np.asarray(~(lost <= MATTERS * largest))
 
-    def error(self) -> FloatArray:
-        """Size of all that is left out or beyond an order, L."""
-        lost = np.hypot(np.hypot(self.left_out, self.failing_size), self.dark)
-        error = np.hypot(lost.reshape(-1, *(1,) * (self.creeping.ndim - 1)), np.sqrt(self.doubt))
-        return np.asarray(np.where(np.isfinite(error), error, np.nan))
+    def methods(self) -> np.ndarray[Any, np.dtype[np.str_]]:
+        """The one word for all of it (m,)."""
+        return np.full(len(self.left_out), "rays+optics", dtype="<U16")
 
 
 def _clear_points(

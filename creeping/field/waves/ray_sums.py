@@ -27,6 +27,7 @@ Sources: [LK59], [AS64, sec. 9.2 and 10.4]; Derivations, F20. A to D were set on
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,24 +38,48 @@ from creeping.field.creeping_modes import fock_scale, slowest_decay
 from creeping.field.results.point_result import FieldStatus
 from creeping.field.waves.far_geometry import fan_strips
 from creeping.field.waves.near_wave import first_order_share
-from creeping.field.waves.source_waves import left_out
+from creeping.field.waves.shed_wave import left_out
 from creeping.rays.fan import RayFan
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays
 from creeping.rays.status import RayStatus
 from creeping.rays.strips import Strip
 
-CLOSE, VARIES_NEAR = 0.3, {"soft": 0.4, "hard": 0.2, "impedance": 0.25, "conductor": 0.4}
-"""A, and B off the body."""
-LEADING = {"soft": 0.65, "hard": 0.37, "impedance": 0.25, "conductor": 0.65}
-"""E: what second order is worth on spheres of ka = 10 to 60, 0.56 to 0.62 (soft), 0.35 to 0.36 (hard) and up to 0.2
-(impedance) at 95 of 100 points."""
-SQUARED = {"soft": 1.3, "hard": 3.0, "impedance": 1.8, "electric hard": 3.0, "conductor": 3.0}
-VARIES_ON = {"soft": 0.1, "hard": 0.15, "impedance": 0.25, "electric hard": 0.15, "conductor": 0.15}
-"""C, and B on the body."""
-ACROSS = {"soft": 0.3, "hard": 0.3, "impedance": 0.3, "electric hard": 0.3, "conductor": 1.1}
+CLOSE = 0.3
+"""A."""
+
+
+class RayFactors(NamedTuple):
+    """Factors of the error of a boundary's rays.
+
+    Attributes
+    ----------
+    leading : float
+        E: what second order is worth on spheres of ka = 10 to 60, 0.56 to 0.62 (soft), 0.35 to 0.36 (hard) and up to
+        0.2 (impedance) at 95 of 100 points.
+    varies_near, varies : float
+        B off the body and on it.
+    squared, across : float
+        C and D.
+    """
+
+    leading: float
+    varies_near: float
+    varies: float
+    squared: float
+    across: float
+
+
+FACTORS = {
+    "soft": RayFactors(0.65, 0.4, 0.1, 1.3, 0.3),
+    "hard": RayFactors(0.37, 0.2, 0.15, 3.0, 0.3),
+    "impedance": RayFactors(0.25, 0.25, 0.25, 1.8, 0.3),
+    "conductor": RayFactors(0.65, 0.4, 0.15, 3.0, 1.1),
+    # on the body alone
+    "electric hard": RayFactors(np.nan, np.nan, 0.15, 3.0, 0.3),
+}
 LEAST_XI = 0.7
-"""D, and the least xi that the error on the body grows with."""
+"""The least xi that the error on the body grows with, and what a conductor's polarisations turn by."""
 MIXED = 0.8
 """What torsion brings from one polarisation to the other on the way, as a share of what grows with xi."""
 MERGING = 0.3
@@ -76,8 +101,8 @@ CROSSED = {ELECTRIC_SOFT: (1, ELECTRIC_HARD), ELECTRIC_HARD: (-1, ELECTRIC_SOFT)
 """Polarisations of a conductor and the other of each, with the sign of their coupling."""
 STRONG = 0.5
 """Size of the coupling of polarisations from which its expansion fails."""
-VARIES, LEANS, CROSSED_RAYS_LEAST_XI = 0.3, 0.5, 0.7
-"""What ρρ'' and r - 1 turn of a conductor's polarisations, and the least ξ that it grows with: of three ellipsoids."""
+VARIES, LEANS = 0.3, 0.5
+"""What ρρ'' and r - 1 turn of a conductor's polarisations: of three ellipsoids."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,11 +125,6 @@ class RaySum:
     error: FloatArray
     status: IntArray
     faded: FloatArray
-
-    @property
-    def parts(self) -> tuple[ComplexArray, FloatArray, IntArray, FloatArray]:
-        """Values, error, status and faded."""
-        return self.values, self.error, self.status, self.faded
 
 
 def ray_sum(
@@ -169,7 +189,7 @@ def own_error(
     ``height`` (...) is Y of waves off the body. Waves may have components beyond the axes of the rays. ``mixed`` (...)
     is the size of the wave from which torsion may bring some of it, which has a share in its error.
     """
-    size = magnitude(waves[0], rays.time)
+    size, of = magnitude(waves[0], rays.time), FACTORS[boundary.kind]
     # a wave may be infinite
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         change = magnitude(waves[0] - waves[1], rays.time)
@@ -178,14 +198,14 @@ def own_error(
         if height is None:
             across = _mean_across(rays, wavenumber)
             power = small if boundary.kind == "conductor" else across
-            growing = np.hypot(VARIES_ON[boundary.kind] * varying, ACROSS[boundary.kind] * across * power)
+            growing = np.hypot(of.varies * varying, of.across * across * power)
             growing = growing * np.maximum(fock_parameter(rays, wavenumber), LEAST_XI)
-            share = np.hypot(SQUARED[boundary.kind] * (change / size) ** 2, growing)
+            share = np.hypot(of.squared * (change / size) ** 2, growing)
             share = np.hypot(share, left_out(rays, wavenumber, boundary))
         else:
             growing = np.zeros_like(size)
-            leading = LEADING[boundary.kind] * first_order_share(rays, height, wavenumber) * small
-            share = np.linalg.norm([CLOSE * small, VARIES_NEAR[boundary.kind] * varying, leading], axis=0)
+            leading = of.leading * first_order_share(rays, height, wavenumber) * small
+            share = np.linalg.norm([CLOSE * small, of.varies_near * varying, leading], axis=0)
         error = size * np.minimum(share, 1.0) + (change if order == 1 else 0.0)
         if mixed is not None:
             error = np.hypot(error, MIXED * np.minimum(growing, 1.0) * mixed)
@@ -315,5 +335,5 @@ def turning(rays: RayPoints, wavenumber: float) -> FloatArray:
         np.hypot(VARIES * (np.abs(bend) + rate**2), LEANS * np.minimum(np.abs(r - 1), 1)) / m**2
         for r, m, rate, bend in ends
     ]
-    xi = np.maximum(fock_parameter(rays, wavenumber), CROSSED_RAYS_LEAST_XI)
+    xi = np.maximum(fock_parameter(rays, wavenumber), LEAST_XI)
     return np.asarray(np.minimum(np.mean(unlike, axis=0) * xi, 1.0))

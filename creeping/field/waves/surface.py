@@ -4,7 +4,7 @@
     du/dn: the same with (k/m2) F(ξ)                                        soft
 
 Of a point source at the distance R from x0, e^{ikR}/(4πR) is in place of e^{ik d.x0}, and modes have the factors of
-`creeping.field.waves.source_waves`.
+`creeping.field.waves.shed_wave`.
 
 Second order, as a factor of 1 + ( )/(m1 m2) of each mode or, at small ξ, under the integrals of g and F, r the mean of
 both ends:
@@ -29,8 +29,7 @@ from creeping.field.boundary import Boundary, BoundaryLike, scalar_boundaries
 from creeping.field.creeping_modes import modes_of
 from creeping.field.special.airy import Modes
 from creeping.field.special.fock import surface_function, surface_slope
-from creeping.field.waves.shed_wave import SECOND_ORDER, end_residue, limited, mode_waves, smoothstep
-from creeping.field.waves.source_waves import nearness
+from creeping.field.waves.shed_wave import SECOND_ORDER, end_residue, limited, mode_waves, nearness, smoothstep
 from creeping.rays.quantities import RayPoints
 
 
@@ -72,7 +71,7 @@ def surface_waves(rays: RayPoints, wavenumber: float, boundary: Boundary, order:
 
 
 def _first_order(rays: RayPoints, wavenumber: float, boundary: Boundary) -> ComplexArray:
-    """g or F, of a point source with its factor exp{i τ² e/4} (...), e of `creeping.field.waves.source_waves`.
+    """g or F, of a point source with its factor exp{i τ² e/4} (...), e of `creeping.field.waves.shed_wave`.
 
     At small ξ that is one of t under the integral, of which the first power is taken; where it makes the series of
     residues converge that is summed instead.

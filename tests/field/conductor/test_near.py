@@ -7,8 +7,9 @@ from body_checks import directions
 
 import creeping as cr
 from creeping.errors import InvalidInputError
+from creeping.field import near, routes
 from creeping.field.body_currents import cached_currents
-from creeping.field.conductor import near
+from creeping.field.problem import Problem
 from creeping.shadow.attachment import occluded
 
 OBLIQUE = np.array([0.36, 0.48, 0.8])
@@ -104,7 +105,8 @@ def test_far_shadow_by_rays(mie):
     k = 60.0
     for i, name in enumerate(("theta", "phi")):
         E, H = (part[..., i] for part in mie(k, x))
-        alone = near.rays_alone(near.shed_sums(fan, x, k, spherical(i))[0], np.zeros(len(x), dtype=bool))
+        problem = Problem(fan, k, "pec", mix=np.eye(2, dtype=complex)[:, [i]])
+        alone = near.rays_alone(near.shed_sums(problem, x)[0], np.zeros(len(x), dtype=bool))
         off = np.maximum(*(np.linalg.norm(alone.values[:, part] - exact, axis=1) for part, exact in parts(E, H)))
         ok = alone.status == cr.FieldStatus.OK
         assert np.any(ok) and np.all(occluded(body, x, OBLIQUE)), name
@@ -112,18 +114,12 @@ def test_far_shadow_by_rays(mie):
         assert np.all(off[ok] < 0.25 * np.linalg.norm(E, axis=1)[ok])
 
 
-def spherical(i):
-    from creeping.field.results.far_result import spherical_frame
-
-    return spherical_frame(OBLIQUE)[i][:, None].astype(complex)
-
-
 def parts(E, H):
     return (slice(0, 3), E), (slice(3, 6), H)
 
 
 def test_without_currents_rays_alone_say_what_they_lack(ball, monkeypatch):
-    monkeypatch.setattr(near, "affordable", lambda *_: False)
+    monkeypatch.setattr(routes, "affordable", lambda *_, **__: False)
     found = cr.conductor_field(ball, [-1.5 * OBLIQUE, (1.6, 0.0, 1.2)], wavenumber=60.0, polarisation="theta")
     assert found.status_counts["LIT"] >= 1 and found.error[0] > 1
     assert not found.ok[0] and set(found.method) == {"rays"}

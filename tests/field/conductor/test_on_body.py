@@ -7,8 +7,8 @@ from body_checks import directions
 
 import creeping as cr
 from creeping.errors import InvalidInputError
-from creeping.field.conductor.on_body import crosses
 from creeping.field.equation import effort
+from creeping.field.on_body import crosses
 from creeping.field.results.far_result import spherical_frame
 from creeping.geometry.quadrature import body_nodes
 

@@ -5,7 +5,7 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.field.currents.bounce import LOW, received, received_vectors
+from creeping.field.currents.radiation import LOW, received, received_vectors
 from creeping.geometry.quadrature import body_nodes
 from studies.accuracy.bodies import bodies
 from tests.reference import dipoles, fundamental

@@ -24,7 +24,7 @@ def test_sphere(k, rng):
     currents = solution.currents().polarised(incident_mix(electric, along))
     n = directions(rng, 12)
     E, H = pec_total_field(k, 1.0, n, along, electric)
-    charge, error = currents.charge_on_body(n)
+    charge, error = currents.charge_on_body(n, currents.on_body(n).values)
     off = np.abs(charge[:, 0] - np.sum(n * E, axis=1))
     assert off.max() < 1e-3 and np.all(off <= error[:, 0])
     J = currents.on_body(n)

@@ -41,7 +41,8 @@ def total(marched, ray, s):
 )
 def test_sphere(fan, k, kind, limits):
     """Per cent of the sum of waves, medians over bands of s; modes of the second order differ by no more than both."""
-    marched = march_rays(fan_profiles(fan), wavenumber=k, boundary=SOFT if kind == "soft" else HARD)
+    boundary = SOFT if kind == "soft" else HARD
+    marched = march_rays(fan_profiles(fan, boundary), wavenumber=k, boundary=boundary)
     assert np.all(marched.status == MarchStatus.OK)
     s = np.linspace(0.3, 1.2, 271)
     found, size = total(marched, 3, s)
@@ -57,8 +58,8 @@ def test_sphere(fan, k, kind, limits):
 
 
 def test_profiles_of_the_sphere(fan):
-    profiles = fan_profiles(fan, length=2.0, behind=1.2)
-    assert profiles.s[0, 0] == pytest.approx(-1.2) and profiles.s[0, -1] == pytest.approx(2.0)
+    profiles = fan_profiles(fan, HARD)
+    assert profiles.s[0, 0] == pytest.approx(-np.radians(80.0)) and profiles.s[0, -1] == pytest.approx(fan.length)
     np.testing.assert_allclose(profiles.curvature, 1, atol=1e-8)
     np.testing.assert_allclose(profiles.transverse, 1, atol=1e-8)
     np.testing.assert_allclose(profiles.spreading, np.cos(profiles.s), atol=1e-7)
@@ -68,7 +69,7 @@ def test_weighted_bodies_are_refused():
     ball = sc.Sphere(speed="1 + x/4")
     fan = cr.launch(cr.DirectFlow(ball, rtol=1e-8), cr.shadow_line(ball, direction=(0, 0, 1)), length=1.0, n_rays=4)
     with pytest.raises(cr.InvalidInputError, match="has a speed"):
-        fan_profiles(fan)
+        fan_profiles(fan, HARD)
 
 
 def test_rays_of_a_body_that_they_leave():
@@ -77,7 +78,7 @@ def test_rays_of_a_body_that_they_leave():
     line = cr.shadow_line(body, direction=(1, 1, 1))
     fan = cr.launch(cr.DirectFlow(body, rtol=1e-8), line, length=1.5, n_rays=32)
     assert np.any(fan.status == cr.RayStatus.DETACHED)
-    marched = march_rays(fan_profiles(fan), wavenumber=20.0, boundary=HARD)
+    marched = march_rays(fan_profiles(fan, HARD), wavenumber=20.0, boundary=HARD)
     assert np.all(np.isfinite(marched.values))
     ended = np.flatnonzero(fan.status == cr.RayStatus.DETACHED)
     served = [ray for ray in ended if marched.status[ray] == MarchStatus.OK]

@@ -1,1 +1,0 @@
-"""Currents, charges and fields on and near a perfect conductor."""
