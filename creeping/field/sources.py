@@ -4,7 +4,8 @@
 
 A source of e^{ikR}/(4 pi R) at x_s sends to r what x_s receives of the plane wave from there: the total field, lit,
 reflected and creeping, with its error, as `creeping.field.near` and, on the body, `creeping.field.on_body` have it.
-With no body F = e^{-ik r.x_s}. Each direction is an incidence of its own, which serves all sources.
+With no body F = e^{-ik r.x_s}. Each direction is an incidence of its own, which serves all sources. Where the integral
+equation takes no longer for all of them together than rays would, it serves.
 
 Sources: [CK13, sec. 3.3]; Derivations, F27.
 """
@@ -22,12 +23,16 @@ from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError, SingularIncidenceError
 from creeping.field.arguments import checked, checked_plain, observers_of
 from creeping.field.boundary import BoundaryLike, boundary_name
+from creeping.field.equation.effort import SECONDS, plan_of
+from creeping.field.equation.solution import Solution
+from creeping.field.equation.solving import is_rough, solved_alone
 from creeping.field.near import MISSING, near_field
 from creeping.field.results.labelled import ArrayResult, directed
 from creeping.field.results.point_result import FieldStatus, NearField, WithStatus
 from creeping.field.waves.surface import scalar_boundary
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.checks import unit_of
+from creeping.geometry.surface import Surface
 from creeping.rays.fan import launch
 from creeping.rays.transport import Flow
 from creeping.shadow.line import shadow_line
@@ -39,6 +44,8 @@ if TYPE_CHECKING:
 
 N_RAYS = 48
 """Rays of each incidence: their waves are interpolated between them."""
+BY_RAYS = 0.2
+"""Seconds that rays of an incidence take at least, at ka = 30."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -138,8 +145,8 @@ def source_pattern(
     Returns
     -------
     SourcePattern
-        With the ears as sources, the values are head-related transfer functions. Each direction takes about 0.2 s at
-        ka = 30 and 0.6 s at ka = 100.
+        With the ears as sources, the values are head-related transfer functions. By rays each direction takes about
+        0.2 s at ka = 30 and 0.6 s at ka = 100; the integral equation, which serves where it takes no longer, 0.1 s.
 
     Raises
     ------
@@ -169,8 +176,9 @@ def source_pattern(
     values, error = np.zeros(shape, dtype=complex), np.full(shape, MISSING)
     status = np.full(shape, int(FieldStatus.UNRESOLVED))
     error_by, method = np.full(shape, "bound", dtype="<U24"), np.full(shape, "none", dtype="<U16")
+    solution = _solution(flow.body, r, k, boundary)
     for row, towards in enumerate(r):
-        received = _received(flow, x, towards, k, boundary, n_rays)
+        received = solution.near_field(x, row) if solution else _received(flow, x, towards, k, boundary, n_rays)
         if received is not None:
             values[row], error[row], status[row] = received.values, received.error, received.status
             error_by[row], method[row] = received.error_by, received.method
@@ -186,6 +194,14 @@ def source_pattern(
         boundary=boundary_name(boundary),
         length_unit=unit_of(flow.body),
     )
+
+
+def _solution(body: Surface, towards: FloatArray, k: float, boundary: BoundaryLike) -> Solution | None:
+    """The equation solved for plane waves from directions (m, 3), if that takes no longer than rays."""
+    plan = plan_of(body, k, boundary, incidences=len(towards))
+    if is_rough(body) or plan.refused or plan.effort.coarse or plan.seconds > SECONDS + BY_RAYS * len(towards):
+        return None
+    return solved_alone(body, -towards, k, boundary)
 
 
 def _received(

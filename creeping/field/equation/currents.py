@@ -27,7 +27,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
+from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
 from creeping.field.arguments import observers_of
 from creeping.field.boundary import Boundary
 from creeping.field.currents.conductor import ConductorCurrents
@@ -167,7 +167,7 @@ class _OnTiles(SurfaceCurrents):
     def _places(self, points: ArrayLike) -> Places:
         """Places of the body nearest to points (m, 3), L."""
         tile, u, v, _ = self.matrix.tiles.located(as_points(points).reshape(-1, 3))
-        return _on_tiles(self.matrix.tiles, (tile, u, v))
+        return Places.of(self.matrix.tiles, (tile, u, v))
 
     def _unresolved(self, places: Places, nodes: ComplexArray, values: ComplexArray) -> FloatArray:
         """Error of polynomials through the nodes, by what values at places differ from them by: (m,) or (m, p)."""
@@ -290,15 +290,8 @@ class _OnTiles(SurfaceCurrents):
     @cached_property
     def _unresolved_of_tiles(self) -> FloatArray:
         """What the polynomials of tiles do not resolve of currents: (t,), of a conductor and its charge (t, p)."""
-        tiles = self.matrix.tiles
-        # between the nodes next to its corners, where they oscillate most
-        ends = [
-            [0.5 * at[0], 0.5 + 0.5 * at[0]] if tiles.p == 1 else [at[:2].mean(), at[-2:].mean()] for at in tiles.places
-        ]
-        u, v = (np.tile(one.ravel(), tiles.count) for one in np.meshgrid(*ends))
-        places = _on_tiles(tiles, (np.repeat(np.arange(tiles.count), 4), u, v))
-        found = self._unresolved_at(places)
-        return np.asarray(found.reshape(tiles.count, 4, *found.shape[1:]).max(axis=1))
+        found = self._unresolved_at(self.matrix.corners)
+        return np.asarray(found.reshape(self.matrix.tiles.count, 4, *found.shape[1:]).max(axis=1))
 
     def _unresolved_at(self, places: Places) -> FloatArray:
         """What the polynomials of tiles do not resolve at places of them."""
@@ -380,12 +373,6 @@ def _at_edges(away: FloatArray) -> FloatArray:
     """
     grown = np.sqrt(1 / np.clip(away, CLOSEST, 1.0)) - 1
     return np.asarray(np.hypot(grown, 1 / (np.pi * np.maximum(away, 1.0))))
-
-
-def _on_tiles(tiles: Tiles, own: tuple[IntArray, FloatArray, FloatArray]) -> Places:
-    """Places of tiles (m,) at u and v."""
-    x, normals = tiles.on(*own)
-    return Places.at(x, normals, own)
 
 
 def inside_points(body: Surface, tiles: Tiles, wavelength: float) -> FloatArray:

@@ -55,6 +55,8 @@ TANGENT = 2
 """Nodes more along a side of a curved tile than it has, at which J is made tangent to the body."""
 EACH, VECTOR = 7.3e-9, 2.0
 """Seconds of a pair, and what a pair of a conductor takes of that."""
+KEPT = 3e8
+"""Bytes of rows at corners that are kept at most."""
 BLOCK = 512
 """Rows that are made at a time of what is not kept."""
 
@@ -219,6 +221,11 @@ class Places(NamedTuple):
         a /= np.linalg.norm(a, axis=1, keepdims=True)
         return cls(points, normals, a, np.cross(normals, a), own)
 
+    @classmethod
+    def of(cls, tiles: Tiles, own: tuple[IntArray, FloatArray, FloatArray]) -> "Places":
+        """Places of tiles (m,) at u and v."""
+        return cls.at(*tiles.on(*own), own)
+
     def part(self, at: Any) -> "Places":
         """Some of them."""
         own = self.own and tuple(lane[at] for lane in self.own)
@@ -236,6 +243,8 @@ class Matrix:
         sqrt(w).
     inside : (m, 3), L, or None
         Points inside the body at which currents are judged, once they are known.
+    many : bool
+        Whether many incidences are to be judged.
     """
 
     def __init__(self, tiles: Tiles, wavenumber: float, boundary: Boundary) -> None:
@@ -248,11 +257,23 @@ class Matrix:
         self.root = np.sqrt(tiles.weights)
         self.columns = 2 if self.vector else 1
         self.inside: FloatArray | None = None
+        self.many = False
+        self._kept: dict[tuple[str, int], np.ndarray] = {}
 
     @cached_property
     def soft_one(self) -> "Matrix":
         """That of soft bodies on the same tiles."""
         return self if self.soft else Matrix(self.tiles, self.k, SOFT)
+
+    @cached_property
+    def corners(self) -> Places:
+        """Four places of each tile, between the nodes next to its corners, where polynomials oscillate most (4 t,)."""
+        tiles = self.tiles
+        ends = [
+            [0.5 * at[0], 0.5 + 0.5 * at[0]] if tiles.p == 1 else [at[:2].mean(), at[-2:].mean()] for at in tiles.places
+        ]
+        u, v = (np.tile(one.ravel(), tiles.count) for one in np.meshgrid(*ends))
+        return Places.of(tiles, (np.repeat(np.arange(tiles.count), 4), u, v))
 
     @cached_property
     def edge_term(self) -> EdgeTerm:
@@ -268,15 +289,22 @@ class Matrix:
     def received(self, places: Places, values: ComplexArray, kind: str = "double") -> ComplexArray:
         """What places (m,) receive of values (n, c) at the nodes: (m, c); of a conductor (n, 2, c) and (m, 2, c).
 
-        ``kind`` is "double" for M u or M J, "slope" for 2 int u dG/dn_x dS, "single" for 2 int u G dS.
+        ``kind`` is "double" for M u or M J, "slope" for 2 int u dG/dn_x dS, "single" for 2 int u G dS. Where many
+        incidences ask for the same ones at the corners they are kept.
         """
         n, columns, m = len(self.root), self.columns, len(places.points)
         scaled = values.reshape(n, -1) * self.root[:, None]
         scaled = np.asarray(scaled.reshape(n * columns, -1), dtype=np.complex64)
         out = np.empty((m * columns, scaled.shape[1]), dtype=complex)
+        keep = self.many and places is self.corners and 8.0 * m * n * columns**2 <= KEPT
         for first in range(0, m, BLOCK):
-            part = places.part(slice(first, first + BLOCK))
-            out[columns * first : columns * (first + BLOCK)] = self.rows(part, np.ones(len(part.points)), kind) @ scaled
+            rows = self._kept.get((kind, first)) if keep else None
+            if rows is None:
+                part = places.part(slice(first, first + BLOCK))
+                rows = self.rows(part, np.ones(len(part.points)), kind)
+            if keep:
+                self._kept[kind, first] = rows
+            out[columns * first : columns * (first + BLOCK)] = rows @ scaled
         return out.reshape(m, *values.shape[1:])
 
     def rows(self, places: Places, scale: FloatArray, kind: str = "double") -> np.ndarray:

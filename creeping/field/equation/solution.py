@@ -91,6 +91,7 @@ class Solution:
         self._kind, self._matrix = kind, Matrix(tiles, wavenumber, kind)
         self.nodes, self.effort = len(tiles.points), effort
         matrix = self._matrix
+        matrix.many = len(directions) > 1
         magnetic = np.swapaxes(np.cross(directions[:, None], spherical_frame(directions)), 1, 2)
         right, under = (
             twice_incident(kind, places, directions, wavenumber, magnetic) for places in (matrix.nodes, matrix.inner)
