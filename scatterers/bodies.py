@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scatterers.shown import Shown
+from scatterers.body import Shown
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

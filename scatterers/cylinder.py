@@ -22,7 +22,7 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
-from scatterers.base.level_body import finite, positive
+from scatterers.body import finite, positive
 from scatterers.exact.profile import Arc, Line, Segment
 from scatterers.exact.revolved import Revolved
 

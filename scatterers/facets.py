@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scatterers.body import Shown, teller
 from scatterers.cad_file.files import SUFFIXES, CadReading, cad_triangles
-from scatterers.shown import Shown, teller
 from scatterers.triangles.files import read_mesh
 from scatterers.triangles.quality import Choice
 

@@ -13,7 +13,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scatterers.base.level_body import LevelBody, numbers
+from scatterers.base.level_body import LevelBody
+from scatterers.body import numbers
 from scatterers.sphere_map.star import star_map
 from scatterers.spline.cloud import Samples
 from scatterers.spline.tensor import TensorSpline, coefficients

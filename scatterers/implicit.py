@@ -1,7 +1,7 @@
 """Body F(x, y, z) = 0 from an expression: differentiated by sympy, compiled, and examined before use.
 
-The body is looked for on grids (`scatterers.expression.singularities`): F < 0 in one connected region inside the box, F
-> 0 in one around it. Then places are looked for where it is not smooth: tips (`scatterers.expression.singularities`),
+The body is looked for on grids (`scatterers.exact.singularities`): F < 0 in one connected region inside the box, F
+> 0 in one around it. Then places are looked for where it is not smooth: tips (`scatterers.exact.singularities`),
 and curves along which max, min and where change their choice and the normal or the curvature jumps.
 """
 
@@ -14,12 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scatterers.base.level_body import LevelBody, numbers, positive
+from scatterers.base.level_body import LevelBody
+from scatterers.body import SHARP, Crease, Piece, no_charts, numbers, positive
 from scatterers.cached import cached
-from scatterers.exact.body import SHARP, Piece, no_charts
 from scatterers.exact.clipped import clip, creases, march, normals
-from scatterers.expression.parsing import one_sided
-from scatterers.expression.singularities import (
+from scatterers.exact.singularities import (
     FINE,
     SIZES,
     distinct,
@@ -34,9 +33,8 @@ from scatterers.expression.singularities import (
     singular_points,
     tightened,
 )
-from scatterers.expression.space import ExpressionSpace
-from scatterers.expression.switches import Switches
-from scatterers.pieces.patch import Crease
+from scatterers.exact.switches import ExpressionSpace, Switches
+from scatterers.expression import one_sided
 from scatterers.sphere_map.star import star_map
 from scatterers.spline.cloud import Samples
 

@@ -33,7 +33,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from scatterers.base.level_body import finite, positive
+from scatterers.body import finite, positive
 from scatterers.exact.profile import Arc, Segment
 from scatterers.exact.revolved import Revolved
 

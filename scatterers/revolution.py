@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scatterers.base.level_body import numbers
+from scatterers.body import numbers
 from scatterers.exact.profile import Line, Segment, SplineSegment, smooth_end, upward
 from scatterers.exact.revolved import Revolved
 

@@ -50,7 +50,7 @@ class ExpressionSpeed:
 
     @cached_property
     def _functions(self) -> Any:
-        from scatterers.expression.parsing import differentiate
+        from scatterers.expression import differentiate
 
         return differentiate(self.expression)
 
@@ -137,7 +137,7 @@ class Coating:
 
     @cached_property
     def _functions(self) -> Any:
-        from scatterers.expression.parsing import differentiate
+        from scatterers.expression import differentiate
 
         return tuple(differentiate(text).value for text in (self.real, self.imaginary))
 

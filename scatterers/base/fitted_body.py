@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from scatterers.base.level_body import LevelBody
 from scatterers.base.quadrics import PieceCloud, PointCloud
 from scatterers.base.two_fits import good_fit, require_one_body
+from scatterers.body import Crease, Piece, teller
 from scatterers.pieces.fitting import fitted_pieces
-from scatterers.pieces.patch import Crease
-from scatterers.pieces.spline_body import SplinePiece, SplinePieces
-from scatterers.shown import teller
+from scatterers.pieces.spline_body import SplinePieces
 from scatterers.sphere_map.star import star_map
 from scatterers.spline import cache as _fit_cache
 from scatterers.spline.cloud import FitReport, Samples
@@ -80,7 +79,7 @@ class SplineBody(LevelBody):
         return () if self._parts is None else self._parts.creases
 
     @property
-    def pieces(self) -> tuple[SplinePiece, ...]:
+    def pieces(self) -> tuple[Piece, ...]:
         """The smooth pieces; empty if the whole body is smooth."""
         return () if self._parts is None else self._parts.surfaces
 

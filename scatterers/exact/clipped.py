@@ -23,7 +23,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.pieces.patch import Crease
+from scatterers.body import Crease
 
 NEWTON = 20
 HALVINGS = 45

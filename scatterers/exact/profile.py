@@ -26,7 +26,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.base.level_body import finite
+from scatterers.body import finite
 from scatterers.kernels.revolved import CONIC, SPLINE
 
 OFF = 1e-9

@@ -30,13 +30,11 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.base.level_body import positive
-from scatterers.exact.body import SHARP, NoCharts, Piece, PiecewiseBody
+from scatterers.body import SHARP, Crease, NoCharts, Piece, PiecewiseBody, positive
 from scatterers.exact.profile import Segment
 from scatterers.kernels.compiled import Compiled
 from scatterers.kernels.revolved import ROWS, SPLINE, WIDTH, evaluate, numbers
 from scatterers.kernels.tensor import HEADER
-from scatterers.pieces.patch import Crease
 
 if TYPE_CHECKING:
     from scatterers.sphere_map.star import CubeSphereAtlas
@@ -44,11 +42,9 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from types import FunctionType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from scatterers.cached import cached
-from scatterers.kernels.compiled import OPTIONS
 from scatterers.kernels.revolved import value_and_gradient
 from scatterers.sphere_map.radial import RadialMap, Spine
 from scatterers.sphere_map.star import CubeSphereAtlas
@@ -70,8 +66,6 @@ FEWEST = 6
 """Points on a ring, however short."""
 STEEP = 1.1
 """Turn of the profile along a square, radians, at most."""
-# nodes along an axis plus four, of one cell
-ONE_CELL = 6.0
 SLACK = 0.1
 """By which the box of the map is wider than the body, in its half widths."""
 
@@ -415,8 +409,9 @@ class RevolvedSpace:
 
     def flat(self, of_map: FloatArray) -> FloatArray:
         """Parameters of the compiled functions: a grid of one cell, those of a map, those of the body."""
-        cell = [np.full(3, ONE_CELL), self.box[0], 1 / (self.box[1] - self.box[0]), of_map]
-        return self.packed(np.concatenate(cell))
+        from scatterers.kernels.radial import one_cell
+
+        return self.packed(one_cell(self.box, of_map))
 
     @property
     def sources(self) -> dict[str, Callable[..., None]]:
@@ -441,14 +436,6 @@ def charts(bounds: FloatArray, tiles: Tiles, packed: Callable[[FloatArray], Floa
 @cache
 def _forward() -> Callable[..., None]:
     """The sphere map's function on this level, the same object at every call."""
-    from numba import njit
+    from scatterers.kernels.radial import forward_over
 
-    from scatterers.kernels import radial as kernels
-
-    space: dict[str, Any] = dict(vars(kernels))
-    space["value_and_gradient"] = njit(**OPTIONS)(value_and_gradient)
-    for name in ("_at", "_radius"):
-        space[name] = njit(**OPTIONS)(FunctionType(space[name].py_func.__code__, space, name))
-    # a file that does not exist: numba must not take the code that it keeps for splines
-    code = kernels.forward.__code__.replace(co_filename="<body of revolution>")
-    return FunctionType(code, space, "forward")
+    return forward_over(value_and_gradient, "body of revolution")

@@ -45,7 +45,7 @@ def _bounded(t, beyond):  # type: ignore[no-untyped-def]
 
 
 def locate(points, gradients, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]
-    """Chart, chart variables and polar frame of a block; the compiled twin of locate and polar_frame.
+    """Chart, chart variables and polar frame of a block.
 
     Where no chart is valid, the one with the least max(|u - 1/2|, |v - 1/2|), else chart 0, with bounded u and v.
     """

@@ -6,8 +6,13 @@ Sources: Derivations, B4.
 """
 
 import math
+from collections.abc import Callable
+from types import FunctionType
+from typing import Any
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from scatterers.kernels.compiled import OPTIONS
 from scatterers.kernels.tensor import (
@@ -138,6 +143,23 @@ def forward(s, points, derivatives, parameters):  # type: ignore[no-untyped-def]
         derivatives[1, i], derivatives[4, i], derivatives[7, i] = column
         column = _pushed((-y[0] * gz, -y[1] * gz, r * c - y[2] * gz), slope, parameters)
         derivatives[2, i], derivatives[5, i], derivatives[8, i] = column
+
+
+def forward_over(value_and_gradient: Callable[..., Any], name: str) -> FunctionType:
+    """`forward` over another F than a spline, whose plain Python this is.
+
+    Its code belongs to a file that does not exist: numba must not take what it keeps for splines.
+    """
+    space: dict[str, Any] = dict(globals())
+    space["value_and_gradient"] = njit(**OPTIONS)(value_and_gradient)
+    for caller in ("_at", "_radius"):
+        space[caller] = njit(**OPTIONS)(FunctionType(space[caller].py_func.__code__, space, caller))
+    return FunctionType(forward.__code__.replace(co_filename=f"<{name}>"), space, "forward")
+
+
+def one_cell(box: NDArray[np.float64], of_map: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Parameters of a grid of one cell, the box (2, 3), L, in which an F of another kind is known; and of its map."""
+    return np.concatenate([np.full(3, 6.0), box[0], 1 / (box[1] - box[0]), of_map])
 
 
 def inverse(points, s, parameters):  # type: ignore[no-untyped-def]

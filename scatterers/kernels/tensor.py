@@ -261,12 +261,6 @@ def evaluate(points, values, gradients, hessians, parameters):  # type: ignore[n
 evaluate.operations = 1250.0  # type: ignore[attr-defined]
 
 
-@njit(cache=True)
-def call(function, points, values, gradients, hessians, parameters):  # type: ignore[no-untyped-def]
-    """Fill one block by a compiled level, which Python itself cannot call."""
-    function(points, values, gradients, hessians, parameters)
-
-
 @njit(cache=True, nogil=True, **OPTIONS)
 def twice(values, damping, wanted, first, second, third, work, out):  # type: ignore[no-untyped-def]
     """Fill out (nx, ny, nz) with S (D S values) where wanted, else zero.

@@ -26,13 +26,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scatterers.body import Crease
 from scatterers.pieces.patch import (
     COARSER,
     SLIGHT,
     SPACING,
     TIP,
     Closeness,
-    Crease,
     Patch,
     curved,
     divided,

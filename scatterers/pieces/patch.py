@@ -17,8 +17,6 @@ With corners x_i, normals n_i and barycentric coordinates b_i, the cubic triangl
 and quadratic normals, which mirror the mean of two normals in the middle of a side. Neighbours with common normals meet
 without gaps.
 
-Also here: where smooth pieces of a body meet or end.
-
 Sources: Derivations, B13; [VPBM01] Vlachos, Peters, Boyd, Mitchell, Curved PN triangles, I3D 2001, eqs. 1 to 6.
 """
 
@@ -29,8 +27,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from scatterers.kernels.tensor import POWERS
 from scatterers.spline.fitting import ACCURACY, fit, spacing_of
-from scatterers.spline.tensor import TensorSpline, weights
+from scatterers.spline.tensor import TensorSpline
 from scatterers.triangles.jets import Jets, centroids, signed_distance
 
 EXACT = 1e-6
@@ -202,7 +201,7 @@ def tip_of(patch: Patch) -> FloatArray | None:
         return None
     tip = np.asarray(middle - np.linalg.solve(hessian, spline.gradient(middle[None])[0]))
     # Q = 0 is a cone or nearly one: its sheets come as near as that to the tip
-    gap = np.sqrt(2 * abs(float(spline.value(tip[None])[0])) / strength.max())
+    gap = np.sqrt(2 * abs(float(spline.level(tip[None])[0])) / strength.max())
     return tip if gap < TIP * float(spline.spacing[0]) else None
 
 
@@ -228,7 +227,9 @@ def _as_spline(q: FloatArray, powers: list[tuple[int, int, int]], middle: FloatA
     """half sum q_p ((x - middle)/half)^p as a spline of one cell, which reaches from middle - half to middle + half."""
     # t of the cell is (1 + y)/2, y the variable of the monomials: coefficients of y^m
     t = np.linspace(0.0, 1.0, 6)
-    rows = np.linalg.solve(weights(t, 0)[..., 0], np.stack([(2 * t - 1) ** m for m in range(3)], axis=1))
+    rows = np.linalg.solve(
+        np.vander(t, 6, increasing=True) @ POWERS, np.stack([(2 * t - 1) ** m for m in range(3)], axis=1)
+    )
     total = np.zeros((6, 6, 6))
     for value, (a, b, c) in zip(q, powers, strict=True):
         total += value * np.einsum("i,j,k->ijk", rows[:, a], rows[:, b], rows[:, c])
@@ -303,51 +304,3 @@ def curved(corners: FloatArray, normals: FloatArray, place: FloatArray) -> tuple
         middle = middle / np.maximum(np.linalg.norm(middle, axis=-1, keepdims=True), 1e-300)
         normal = normal + 2 * w[i] * w[j] * middle
     return np.asarray(points), np.asarray(normal / np.linalg.norm(normal, axis=-1, keepdims=True))
-
-
-@dataclass(frozen=True, eq=False)
-class Crease:
-    """A curve along which two pieces meet, or a tip.
-
-    Attributes
-    ----------
-    kind : {"edge", "joint", "tip", "seam"}
-        The normal jumps; the curvature or a derivative of it jumps, the normal does not; one point, without a normal;
-        nothing jumps, the same smooth surface is known by another F.
-    pieces : (int, int)
-        On either side; the same twice at a tip, or where a piece meets itself.
-    points : (n, 3), L
-        In order; the first comes again at the end of a closed curve.
-    angle : float
-        Largest angle between the normals of both sides, radians; 0 of a joint.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> rim = Crease("edge", (0, 1), np.array([[1.0, 0, 0], [0, 1, 0], [1, 0, 0]]), np.pi / 2)
-    >>> rim
-    Crease(edge between pieces 0 and 1, 90 degrees, length 2.83 L, closed)
-    """
-
-    kind: str
-    pieces: tuple[int, int]
-    points: FloatArray
-    angle: float = 0.0
-
-    @property
-    def closed(self) -> bool:
-        """Whether the curve comes back to its first point."""
-        return len(self.points) > 2 and bool(np.array_equal(self.points[0], self.points[-1]))
-
-    @property
-    def length(self) -> float:
-        """Length of the polygon through the points, L."""
-        return float(np.sum(np.linalg.norm(np.diff(self.points, axis=0), axis=1)))
-
-    def __repr__(self) -> str:
-        if self.kind == "tip":
-            return f"Crease(tip of piece {self.pieces[0]} at {tuple(self.points[0].round(6).tolist())})"
-        sides = " and ".join(map(str, self.pieces))
-        turn = f", {np.degrees(self.angle):.3g} degrees" if self.kind == "edge" else ""
-        ring = ", closed" if self.closed else ""
-        return f"Crease({self.kind} between pieces {sides}{turn}, length {self.length:.3g} L{ring})"

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.pieces.patch import Crease
+from scatterers.body import Crease
 from scatterers.triangles.topology import components, edges_of
 
 FLAT, TURN, SHARP, ALWAYS = 0.5, 12.0, 40.0, 60.0

@@ -23,10 +23,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scatterers.body import Crease
+from scatterers.kernels.compiled import evaluated
 from scatterers.kernels.pieces import BESIDES, FIRST, LARGER, MOST_PIECES, SMALLER
 from scatterers.kernels.tensor import CENTRE, HEADER
-from scatterers.pieces.patch import Crease
-from scatterers.spline.tensor import TensorSpline, evaluated
+from scatterers.spline.tensor import TensorSpline
 
 VOXELS = 500_000
 """Voxels about a body."""

@@ -8,11 +8,12 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.kernels.compiled import Compiled
+from scatterers.body import Crease, Piece
+from scatterers.kernels.compiled import evaluated
 from scatterers.pieces.fitting import FittedPieces
-from scatterers.pieces.patch import Crease, curved, divided
+from scatterers.pieces.patch import curved, divided
 from scatterers.pieces.selection import PieceSpace
-from scatterers.spline.tensor import SYMMETRIC, TensorSpline, evaluated
+from scatterers.spline.tensor import TensorSpline
 
 KINDS = ("edge", "joint", "tip", "seam")
 TRUSTED = 1.0
@@ -24,38 +25,6 @@ STEPS, MOVED = 3, 0.1
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
-
-
-@dataclass(frozen=True, eq=False)
-class SplinePiece:
-    """One smooth piece of a body, which goes on a little beyond its creases.
-
-    Attributes
-    ----------
-    spline : TensorSpline
-    bounds : (2, 3), L
-        Box of the body.
-    """
-
-    spline: TensorSpline
-    bounds: FloatArray
-
-    @property
-    def compiled(self) -> Compiled:
-        """Compiled level evaluator."""
-        return self.spline.compiled
-
-    def level(self, points: FloatArray) -> FloatArray:
-        """F, positive outside: points (..., 3), L, to (...)."""
-        return evaluated(self.compiled, points)[0]
-
-    def gradient(self, points: FloatArray) -> FloatArray:
-        """Gradient of F: points (..., 3), L, to (..., 3)."""
-        return evaluated(self.compiled, points)[1]
-
-    def hessian(self, points: FloatArray) -> FloatArray:
-        """Hessian of F, 1/L: points (..., 3), L, to (..., 3, 3)."""
-        return evaluated(self.compiled, points)[2][..., SYMMETRIC]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,10 +62,10 @@ class SplinePieces:
         return cls(space, fitted.creases, corners, fitted.normals, fitted.piece, reach, fitted.astray)
 
     @cached_property
-    def surfaces(self) -> tuple[SplinePiece, ...]:
+    def surfaces(self) -> tuple[Piece, ...]:
         """The pieces."""
         box = np.stack([self.corners.min(axis=(0, 1)), self.corners.max(axis=(0, 1))])
-        return tuple(SplinePiece(spline, box) for spline in self.space.splines)
+        return tuple(Piece(spline.compiled, box) for spline in self.space.splines)
 
     def tiles(self, edge: float) -> tuple[FloatArray, FloatArray, IntArray]:
         """The body as triangles with sides of at most ``edge``, L: corners, normals (m, 3, 3) and pieces (m,)."""

@@ -8,7 +8,7 @@ the body's longest,
 an upright body has T = 1. With y = A s and g = DT^T grad F(x): d psi/ds = r DT (A - y (A g)^T/(g.y)), and
 psi^-1(x) = A^-1 (w - c)/|A^-1 (w - c)|, w = T^-1(x). Every ray meets the body once where g.(w - c) > 0 on all of it.
 The root is found by Newton steps from r = 1, halved into the bracket when they leave it; beyond the grid counts as
-outside the body. `scatterers.kernels.radial` is the compiled twin.
+outside the body. `scatterers.kernels.radial` has the compiled functions.
 
 Sources: Derivations, B4.
 """
@@ -20,18 +20,15 @@ from typing import Protocol
 
 import numpy as np
 from numpy.polynomial import polynomial
-from numpy.typing import NDArray
 
+from creeping._typing import BoolArray, FloatArray
+from scatterers.body import SphereMapped
 from scatterers.cached import cached
-from scatterers.kernels.compiled import Compiled
-from scatterers.kernels.tensor import DEGREE, ITERATIONS, REACH, SMALL
-from scatterers.spline.tensor import evaluated
+from scatterers.kernels.compiled import Compiled, evaluated
+from scatterers.kernels.tensor import DEGREE, REACH
 
 # centroids this near to a parallel of the axis, in half widths, make no spine
 UPRIGHT = 0.01
-
-
-FloatArray = NDArray[np.float64]
 
 
 class SpaceLevel(Protocol):
@@ -100,7 +97,7 @@ class Spine:
         return out
 
     @classmethod
-    def through(cls, inside: NDArray[np.bool_], origin: FloatArray, spacing: FloatArray) -> "Spine":
+    def through(cls, inside: BoolArray, origin: FloatArray, spacing: FloatArray) -> "Spine":
         """Least-squares spine of the slices of the nodes inside a body, weighted by their areas.
 
         A shift within `UPRIGHT` of a constant, by the weighted mean square, is left out.
@@ -130,8 +127,8 @@ class Spine:
 
 
 @dataclass(frozen=True, eq=False)
-class RadialMap:
-    """The map over an F known in a box; satisfies `scatterers.sphere_map.star.SphereMap`.
+class RadialMap(SphereMapped):
+    """The map over an F known in a box.
 
     Attributes
     ----------
@@ -156,66 +153,11 @@ class RadialMap:
         shift = self.spine.shift(ends)
         return np.asarray(self.space.box - self.centre - np.stack([shift.max(0), shift.min(0)]))
 
-    def radius(self, s: FloatArray) -> FloatArray:
-        """Root r of the rays along unit vectors: (..., 3) -> (...); NaN where none is found."""
-        y = self.half_axes * np.asarray(s, dtype=float).reshape(-1, 3)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            high = np.min(np.where(y > 0, self.box[1] / y, np.where(y < 0, self.box[0] / y, np.inf)), axis=-1)
-        low, r = np.zeros(len(y)), np.where(high > 1, 1.0, 0.5 * high)
-        found = np.full(len(y), np.nan)
-        active = np.flatnonzero(np.isfinite(high))
-        for _ in range(ITERATIONS):
-            if not len(active):
-                break
-            at, along = r[active], y[active]
-            value, slope = self._along(at, along)
-            high[active] = np.where(value > 0, np.minimum(high[active], at), high[active])
-            low[active] = np.where(value > 0, low[active], np.maximum(low[active], at))
-            with np.errstate(divide="ignore", invalid="ignore"):
-                step = -value / slope
-            small = np.abs(step) <= SMALL * at
-            inside = (at + step > low[active]) & (at + step < high[active])
-            r[active] = np.where(small | inside, at + step, 0.5 * (low[active] + high[active]))
-            found[active[small]] = r[active[small]]
-            active = active[~small]
-        return found.reshape(np.shape(s)[:-1])
-
-    def _along(self, r: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """F, infinite beyond the grid, and its derivative by r at T(c + r y)."""
-        w = self.centre + r[:, None] * y
-        x = w + self.spine.shift(w)
-        value, gradient, _ = evaluated(self.compiled_level, x)
-        if not self.spine.upright:
-            box = self.space.box
-            value = np.where(np.any((x < box[0]) | (x > box[1]), axis=-1), np.inf, value)
-        return value, np.sum(self.spine.pulled(w, gradient) * y, axis=-1)
-
     def facing(self, points: FloatArray) -> FloatArray:
         """g.(w - c) at points of the body, positive where rays leave it: (..., 3) -> (...)."""
         _, gradient, _ = evaluated(self.compiled_level, points)
         y = points - self.spine.shift(points) - self.centre
         return np.asarray(np.sum(self.spine.pulled(points, gradient) * y, axis=-1))
-
-    def forward(self, s: FloatArray) -> FloatArray:
-        """psi(s), L: unit vectors (..., 3) to (..., 3)."""
-        w = self.centre + self.radius(s)[..., None] * self.half_axes * s
-        return np.asarray(w + self.spine.shift(w))
-
-    def derivative(self, s: FloatArray) -> FloatArray:
-        """Derivative of psi, L: unit vectors (..., 3) to (..., 3, 3)."""
-        r, y = self.radius(s), self.half_axes * s
-        w = self.centre + r[..., None] * y
-        _, gradient, _ = evaluated(self.compiled_level, w + self.spine.shift(w))
-        g = self.spine.pulled(w, gradient)
-        slope = g * self.half_axes / np.sum(g * y, axis=-1, keepdims=True)
-        inner = r[..., None, None] * (np.diag(self.half_axes) - y[..., :, None] * slope[..., None, :])
-        return np.asarray(inner + self.spine.slope(w)[..., :, None] * inner[..., None, self.spine.axis, :])
-
-    def inverse(self, points: FloatArray) -> FloatArray:
-        """psi^-1(x), of unit length: points (..., 3), L, to (..., 3)."""
-        points = np.asarray(points, dtype=float)
-        s = (points - self.spine.shift(points) - self.centre) / self.half_axes
-        return np.asarray(s / np.linalg.norm(s, axis=-1, keepdims=True))
 
     @cached_property
     def parameters(self) -> FloatArray:

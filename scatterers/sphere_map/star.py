@@ -14,23 +14,19 @@ The equiangular cubed sphere is that of [RIP96]; Derivations, B1.
 Sources: Derivations, B4.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scatterers.kernels.compiled import Compiled
+from creeping._typing import FloatArray, IntArray
+from scatterers.body import SphereMapped
+from scatterers.kernels.compiled import Compiled, evaluated, inverted, mapped
 from scatterers.sphere_map.radial import RadialMap, SpaceLevel, Spine
 from scatterers.spline.cloud import Samples
-from scatterers.spline.tensor import evaluated
 
 CHECKED = 20000
 """Points of the body at which the centre is checked."""
-
-
-FloatArray = NDArray[np.float64]
 
 
 def star_map(space: SpaceLevel, samples: Samples, centre: FloatArray | None) -> tuple[RadialMap | None, str]:
@@ -71,37 +67,11 @@ def _hidden(sphere_map: RadialMap, points: FloatArray) -> str:
     return f"the body is not star-shaped about {where}: {hidden} of {len(points)} directions fail; {remedy}"
 
 
-class SphereMap(Protocol):
-    """A diffeomorphism psi from the unit sphere to the body, with its 3 x 3 derivative."""
-
-    def forward(self, s: FloatArray) -> FloatArray:
-        """Body point, L, of a unit vector: (..., 3) -> (..., 3)."""
-        ...
-
-    def derivative(self, s: FloatArray) -> FloatArray:
-        """Derivative of psi as a map of space, L: (..., 3) -> (..., 3, 3)."""
-        ...
-
-    def inverse(self, points: FloatArray) -> FloatArray:
-        """Sphere point of a body point, L, up to its length: (..., 3) -> (..., 3)."""
-        ...
-
-    @property
-    def compiled_forward(self) -> Compiled:
-        """Compiled psi and its derivative, of kind "forward"."""
-        ...
-
-    @property
-    def compiled_inverse(self) -> Compiled:
-        """Compiled psi^-1, of kind "inverse"."""
-        ...
-
-
 @dataclass(frozen=True)
 class FaceChart:
     """Face ``2 axis + (sign < 0)`` of the equiangular cube over psi."""
 
-    sphere_map: SphereMap
+    sphere_map: SphereMapped
     axis: int
     sign: float
     periodic: tuple[bool, bool] = (False, False)
@@ -143,7 +113,7 @@ class FaceChart:
 class CubeSphereAtlas:
     """Six equiangular face charts over psi; ``compiled`` is a locator for kernels, or None."""
 
-    sphere_map: SphereMap
+    sphere_map: SphereMapped
     compiled: Compiled | None = None
 
     @property
@@ -151,7 +121,7 @@ class CubeSphereAtlas:
         """The six charts, ordered +x, -x, +y, -y, +z, -z."""
         return [FaceChart(self.sphere_map, a, sign) for a in range(3) for sign in (1.0, -1.0)]
 
-    def locate(self, points: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
+    def locate(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
         """Chart number (...) and chart variables (..., 2) of points (..., 3)."""
         s = self.sphere_map.inverse(np.asarray(points, dtype=float))
         axis = np.argmax(np.abs(s), axis=-1)[..., None]
@@ -165,43 +135,44 @@ class CubeSphereAtlas:
 
 @dataclass(frozen=True)
 class PeriodicChart:
-    """A chart of period 1 in both variables, given by its point and tangent functions."""
+    """A chart of period 1 in both variables, by the compiled forward function of its atlas."""
 
-    point_of: Callable[[FloatArray], FloatArray]
-    tangents_of: Callable[[FloatArray], FloatArray]
+    compiled_forward: Compiled
     periodic: tuple[bool, bool] = (True, True)
+
+    def _mapped(self, uv: FloatArray) -> tuple[FloatArray, FloatArray]:
+        uv = np.asarray(uv, dtype=float)
+        return mapped(self.compiled_forward, np.concatenate([uv, np.zeros_like(uv[..., :1])], axis=-1))
 
     def point(self, uv: FloatArray) -> FloatArray:
         """Point of the body: (..., 2) -> (..., 3), L."""
-        return self.point_of(np.asarray(uv, dtype=float))
+        return self._mapped(uv)[0]
 
     def tangents(self, uv: FloatArray) -> FloatArray:
         """Columns x_u, x_v: (..., 2) -> (..., 3, 2), L."""
-        return self.tangents_of(np.asarray(uv, dtype=float))
+        return self._mapped(uv)[1][..., :2]
 
 
 @dataclass(frozen=True)
 class PeriodicAtlas:
-    """A single doubly periodic chart; ``coordinates`` inverts it.
+    """A single doubly periodic chart.
 
-    For kernels: ``compiled`` is a locator; ``compiled_forward`` takes (u, v, anything) to the point and, in columns 0
-    and 1 of the derivative, the tangents; ``compiled_inverse`` takes points to (u, v, 0). All or none may be None.
+    ``compiled`` is its locator; ``compiled_forward`` takes (u, v, anything) to the point and, in columns 0 and 1 of the
+    derivative, the tangents; ``compiled_inverse`` takes points to (u, v, 0).
     """
 
-    chart: PeriodicChart
-    coordinates: Callable[[FloatArray], FloatArray]
-    compiled: Compiled | None = None
-    compiled_forward: Compiled | None = None
-    compiled_inverse: Compiled | None = None
+    compiled: Compiled
+    compiled_forward: Compiled
+    compiled_inverse: Compiled
 
     @property
     def charts(self) -> Sequence[PeriodicChart]:
         """The chart, in a list."""
-        return [self.chart]
+        return [PeriodicChart(self.compiled_forward)]
 
-    def locate(self, points: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
+    def locate(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
         """Chart number 0 (...) and chart variables in [0, 1) (..., 2) of points (..., 3)."""
-        uv = self.coordinates(np.asarray(points, dtype=float)) % 1.0
+        uv = inverted(self.compiled_inverse, points)[..., :2] % 1.0
         # -1e-17 % 1.0 is 1.0
         uv[uv >= 1.0] = 0.0
         return np.zeros(uv.shape[:-1], dtype=np.int64), uv

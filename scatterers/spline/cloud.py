@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.spline.tensor import SYMMETRIC, TensorSpline, evaluated
+from scatterers.kernels.compiled import SYMMETRIC, evaluated
+from scatterers.spline.tensor import TensorSpline
 
 # cells of the first grid, along the side of a cube of the box's volume
 COARSE = 24

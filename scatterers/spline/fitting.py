@@ -31,9 +31,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scatterers.kernels.compiled import SYMMETRIC, evaluated
 from scatterers.kernels.tensor import OVERREAD
 from scatterers.spline.cloud import left_at, tangents
-from scatterers.spline.tensor import SYMMETRIC, Cardinal, TensorSpline, evaluated
+from scatterers.spline.tensor import Cardinal, TensorSpline
 
 OFFSET_WEIGHT = 0.01
 """Of the samples at one cell's distance from the body."""

@@ -6,7 +6,7 @@ With g = (x - origin)/spacing, cell k = floor(g) and fraction t = g - k, axis by
 
 n nodes carrying n + 4 coefficients. Ends are not-a-knot, so quintics are reproduced and F converges as h^6. Beyond
 the grid the outermost cell's polynomial goes on for one cell; from there on t is held. A NaN stays one.
-`scatterers.kernels.tensor` is the compiled twin.
+`scatterers.kernels.tensor` evaluates it.
 
 Also here: from values at the nodes of a grid to coefficients of quintic B-splines there: S = B^-1 along each axis.
 
@@ -20,16 +20,11 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scatterers.kernels.compiled import Compiled
-from scatterers.kernels.tensor import BEYOND, CENTRE, HEADER, OVERREAD, POWERS
-
-# where xx, yy, zz, yz, xz, xy stand in a matrix
-SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
-
-
-FloatArray = NDArray[np.float64]
+from creeping._typing import BoolArray, FloatArray
+from scatterers.body import Levelled
+from scatterers.kernels.compiled import Compiled, evaluated
+from scatterers.kernels.tensor import CENTRE, HEADER, OVERREAD
 
 
 @cache
@@ -55,20 +50,8 @@ def coefficients(samples: FloatArray) -> FloatArray:
     return np.ascontiguousarray(samples)
 
 
-def weights(t: FloatArray, order: int) -> FloatArray:
-    """Weights of the six B-splines and their derivatives up to the order: (...) -> (..., 6, order + 1)."""
-    columns, powers = [], POWERS
-    for _ in range(order + 1):
-        total = np.zeros((*np.shape(t), 6))
-        for row in powers[::-1]:
-            total = total * t[..., None] + row
-        columns.append(total)
-        powers = powers[1:] * np.arange(1, len(powers))[:, None]
-    return np.stack(columns, axis=-1)
-
-
 @dataclass(frozen=True, eq=False)
-class TensorSpline:
+class TensorSpline(Levelled):
     """The spline through samples of F on a grid.
 
     Attributes
@@ -96,46 +79,9 @@ class TensorSpline:
             values = np.sum(shifted, axis=0) / 120
         return values
 
-    def _derivatives(self, points: FloatArray, order: int) -> FloatArray:
-        """All mixed derivatives with up to ``order`` along each axis: (..., 3) -> (..., order + 1, thrice)."""
-        points = np.asarray(points, dtype=float)
-        flat = ((points.reshape(-1, 3)) - self.origin) / self.spacing
-        inside = np.clip(np.nan_to_num(flat, nan=0.0), 0, np.array(self.coefficients.shape) - 6)
-        cell = inside.astype(np.int64)
-        w = weights(np.clip(flat - cell, -BEYOND, 1 + BEYOND), order)
-        w = w / self.spacing[:, None, None] ** np.arange(order + 1)
-        out = np.empty((len(flat), *3 * (order + 1,)))
-        steps = np.arange(6)
-        # the stencils of a batch are gathered at once, so batches stay small
-        for start in range(0, len(flat), 1024):
-            part = slice(start, start + 1024)
-            i, j, k = (cell[part, axis, None] + steps for axis in range(3))
-            stencil = self.coefficients[i[:, :, None, None], j[:, None, :, None], k[:, None, None, :]]
-            rows = stencil.reshape(len(i), 36, 6) @ w[part, 2]
-            planes = np.swapaxes(w[part, 1], 1, 2)[:, None] @ rows.reshape(len(i), 6, 6, -1)
-            out[part] = np.einsum("nia,nibc->nabc", w[part, 0], planes)
-        return out.reshape(*points.shape[:-1], *out.shape[1:])
-
-    def value(self, points: FloatArray) -> FloatArray:
-        """F: points (..., 3), L, to (...)."""
-        return self._derivatives(points, 0)[..., 0, 0, 0]
-
-    def gradient(self, points: FloatArray) -> FloatArray:
-        """Gradient of F, unit of F over L: points (..., 3), L, to (..., 3)."""
-        return self.value_and_gradient(points)[1]
-
     def value_and_gradient(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """F (...) and its gradient (..., 3) at points (..., 3), L."""
-        d = self._derivatives(points, 1)
-        return d[..., 0, 0, 0], np.stack([d[..., 1, 0, 0], d[..., 0, 1, 0], d[..., 0, 0, 1]], axis=-1)
-
-    def hessian(self, points: FloatArray) -> FloatArray:
-        """Hessian of F, unit of F over L^2: points (..., 3), L, to (..., 3, 3)."""
-        d = self._derivatives(points, 2)
-        xx, yy, zz = d[..., 2, 0, 0], d[..., 0, 2, 0], d[..., 0, 0, 2]
-        yz, xz, xy = d[..., 0, 1, 1], d[..., 1, 0, 1], d[..., 1, 1, 0]
-        rows = [np.stack(row, axis=-1) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))]
-        return np.stack(rows, axis=-2)
+        return evaluated(self.compiled, points)[:2]
 
     def flat(self, of_map: FloatArray) -> FloatArray:
         """Parameters of the compiled functions: the header, which ends with those of a map, and the coefficients."""
@@ -156,18 +102,6 @@ class TensorSpline:
         return Compiled(self.sources["level"], "level", self.flat(np.zeros(HEADER - CENTRE)))
 
 
-def evaluated(compiled: Compiled, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """F (...), its gradient (..., 3) and Hessian entries (..., 6), xx, yy, zz, yz, xz, xy, of a compiled spline."""
-    from scatterers.kernels.tensor import call
-
-    points = np.asarray(points, dtype=float)
-    columns = np.ascontiguousarray(points.reshape(-1, 3).T)
-    n, shape = columns.shape[1], points.shape[:-1]
-    values, gradients, hessians = np.empty(n), np.empty((3, n)), np.empty((6, n))
-    call(compiled.function, columns, values, gradients, hessians, compiled.parameters)
-    return values.reshape(shape), gradients.T.reshape(*shape, 3), hessians.T.reshape(*shape, 6)
-
-
 class Cardinal:
     """S D S on grids of one shape, D a number of each node; symmetric, as B is.
 
@@ -184,7 +118,7 @@ class Cardinal:
         self.damping = np.ascontiguousarray(np.swapaxes(damping, 1, 2))
         self.work = np.empty_like(self.damping)
 
-    def __call__(self, values: FloatArray, wanted: NDArray[np.bool_], out: FloatArray) -> FloatArray:
+    def __call__(self, values: FloatArray, wanted: BoolArray, out: FloatArray) -> FloatArray:
         """Out, filled with S D S of values where wanted, else with zero, as values are to be there."""
         from scatterers.kernels.tensor import twice
 

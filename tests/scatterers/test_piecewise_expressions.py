@@ -9,10 +9,9 @@ from tolerances import ORDER
 import creeping as cr
 import scatterers as sc
 from creeping.geometry.surface import PiecewiseSurface
-from scatterers.expression.parsing import differentiate
-from scatterers.expression.switches import Switches
-from scatterers.kernels.compiled import Compiled
-from scatterers.spline.tensor import evaluated
+from scatterers.exact.switches import Switches
+from scatterers.expression import differentiate
+from scatterers.kernels.compiled import Compiled, evaluated
 
 EDGE_AT = 1e-12
 """Points of an edge off both of its pieces."""

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from scatterers.atlas.monge.charts import Field, FloatArray, MongeChart, MongeCharts
 from scatterers.atlas.monge.cover import VALID, Cover, covered_by, probes
 from scatterers.cached import cached
-from scatterers.kernels.compiled import Compiled
-from scatterers.kernels.monge import CHART, FIRST, LEAN, ORIGIN, OUTSIDE, PER_SIDE, SHAPE, VOXELS
+from scatterers.kernels.compiled import Compiled, call
+from scatterers.kernels.monge import CHART, FIRST, LEAN, OUTSIDE, VOXELS
 
 # times that the cloud is completed where the atlas misses a point between
 ROUNDS = 4
@@ -101,32 +101,18 @@ class MongeAtlas:
 
     def locate(self, points: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
         """Chart number (...) and chart variables (..., 2) of points (..., 3); -1 and NaN where there is none."""
-        points = np.asarray(points, dtype=float)
-        x = points.reshape(-1, 3)
-        normal = self.graphs.gradient(x)
-        p = self.parameters
-        shape, first = p[SHAPE:VOXELS].astype(np.int64), int(p[VOXELS])
-        # far from the body anything may come
-        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-            place = np.nan_to_num((x - p[ORIGIN:PER_SIDE]) * p[PER_SIDE]).clip(0, shape - 1).astype(np.int64)
-        entry = p[first + (place[:, 0] * shape[1] + place[:, 1]) * shape[2] + place[:, 2]].astype(np.int64)
-        count = p[entry].astype(np.int64)
-        table = p[FIRST:first].reshape(-1, CHART)
-        chart, uv, best = np.full(len(x), -1), np.full((len(x), 2), np.nan), np.full(len(x), np.inf)
-        for k in range(int(count.max(initial=0))):
-            some = np.flatnonzero(count > k)
-            number = p[entry[some] + 1 + k].astype(np.int64)
-            row = table[number]
-            q = np.einsum("nij,nj->ni", row[:, 3:12].reshape(-1, 3, 3), x[some] - row[:, :3])
-            t = q[:, :2] * row[:, 12:13]
-            score = np.max(np.abs(t), axis=-1)
-            valid = np.sum(normal[some] * row[:, 9:12], axis=-1) >= p[LEAN]
-            valid &= (q[:, 2] >= row[:, 13]) & (q[:, 2] <= row[:, 14]) & (score < best[some])
-            some = some[valid]
-            best[some], chart[some], uv[some] = score[valid], number[valid], 0.5 + 0.5 * t[valid]
-        uv = uv.clip(0.5 - 0.5 * p[OUTSIDE], 0.5 + 0.5 * p[OUTSIDE])
-        return chart.reshape(points.shape[:-1]), uv.reshape(*points.shape[:-1], 2)
+        x = np.ascontiguousarray(np.reshape(points, (-1, 3)).T, dtype=float)
+        normal, n = np.ascontiguousarray(self.graphs.gradient(x.T).T), x.shape[1]
+        chart, uv = np.empty(n, np.int64), np.empty((2, n))
+        call(self.compiled.function, x, normal, chart, uv, np.empty((6, n)), self.parameters)
+        # the locator takes a chart for every point; by these it is known whether it is one
+        row = self.parameters[FIRST : int(self.parameters[VOXELS])].reshape(-1, CHART)[chart]
+        height = np.einsum("in,ni->n", x, row[:, 9:12]) - np.einsum("ni,ni->n", row[:, :3], row[:, 9:12])
+        with np.errstate(invalid="ignore"):
+            lean = np.einsum("in,ni->n", normal, row[:, 9:12]) / np.linalg.norm(normal, axis=0)
+        none = ~((lean >= self.parameters[LEAN]) & (height >= row[:, 13]) & (height <= row[:, 14]))
+        chart[none], uv[:, none] = -1, np.nan
+        return chart.reshape(np.shape(points)[:-1]), uv.T.reshape(*np.shape(points)[:-1], 2)
 
     def arrays(self) -> dict[str, FloatArray]:
         """All that `restored` needs besides F."""

@@ -5,8 +5,8 @@ import pytest
 import trimesh
 
 import scatterers as sc
+from scatterers.kernels.compiled import SYMMETRIC, evaluated
 from scatterers.pieces.patch import curved, divided, polynomial_through
-from scatterers.spline.tensor import SYMMETRIC, evaluated
 
 RNG = np.random.default_rng(11)
 U, V = RNG.uniform(0, 1.5, 200), RNG.uniform(-1, 1, 200)

@@ -1,18 +1,22 @@
-"""Pieces of an expression: what is left of it once every max, min and where has chosen."""
+"""F given by an expression, as sphere maps and kernels need it, and its pieces.
+
+The kernels of the sphere map are written for a spline; here they run on the expression: the same code, with the
+expression in the place of the spline's value and gradient, and a grid of one cell, the box, in its parameters.
+
+A piece is what is left of an expression once every max, min and where has chosen.
+"""
 
 from collections.abc import Callable, Iterable
-from functools import cached_property
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scatterers.expression.chosen import NUMERIC, choosing
-from scatterers.expression.parsing import Differentiated, derivatives, parse
+from creeping._typing import FloatArray, IntArray
+from scatterers.expression import NUMERIC, Differentiated, choosing, derivatives, differentiate, parse
 from scatterers.kernels.compiled import Compiled, Kind
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 MOST_PIECES = 64
 
 
@@ -147,3 +151,48 @@ def plane(points: FloatArray, values: FloatArray, gradients: FloatArray, hessian
 def compiled_piece(text: str, made: tuple[int, ...], kind: Kind, parameters: FloatArray) -> Compiled:
     """The compiled block evaluator of what an expression is by the choices made."""
     return met_before(text, [made]).compiled(0)
+
+
+@dataclass(frozen=True, eq=False)
+class ExpressionSpace:
+    """F of an expression in a box; satisfies `scatterers.sphere_map.radial.SpaceLevel`.
+
+    Attributes
+    ----------
+    expression : str
+    box : (2, 3), L
+    """
+
+    expression: str
+    box: FloatArray
+
+    @property
+    def functions(self) -> Differentiated:
+        """The expression and its derivatives."""
+        return differentiate(self.expression)
+
+    def flat(self, of_map: FloatArray) -> FloatArray:
+        """Parameters of the compiled functions: a grid of one cell and those of a map."""
+        from scatterers.kernels.radial import one_cell
+
+        return one_cell(self.box, of_map)
+
+    @property
+    def sources(self) -> dict[str, Callable[..., None]]:
+        """Plain Python of the compiled functions."""
+        return _sources(self.expression)
+
+
+@lru_cache(maxsize=64)
+def _sources(expression: str) -> dict[str, Callable[..., None]]:
+    """The level and the sphere map's function on the expression, the same objects at every call."""
+    from scatterers.kernels.radial import forward_over
+
+    forward = forward_over(differentiate(expression).first, "expression")
+    forward.again = compiled_forward, expression  # type: ignore[attr-defined]
+    return {"level": differentiate(expression).block, "forward": forward}
+
+
+def compiled_forward(expression: str, kind: Kind, parameters: FloatArray) -> Compiled:
+    """The compiled sphere map's function on an expression."""
+    return Compiled(_sources(expression)["forward"], kind, parameters)

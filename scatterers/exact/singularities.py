@@ -10,10 +10,9 @@ beyond.
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.expression.space import ExpressionSpace
-from scatterers.kernels.compiled import Compiled
+from scatterers.exact.switches import ExpressionSpace
+from scatterers.kernels.compiled import SYMMETRIC, Compiled, evaluated
 from scatterers.spline.cloud import Samples, step_onto
-from scatterers.spline.tensor import SYMMETRIC, evaluated
 
 SINGULAR = 1e-6
 """|grad F| on the body, relative to its median there, below which a point is singular."""
