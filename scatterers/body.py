@@ -8,6 +8,7 @@ between pieces it jumps. Of a point near the body the piece counts whose part of
 """
 
 import math
+import reprlib
 import sys
 from collections.abc import Callable, Sequence, Sized
 from dataclasses import dataclass, fields
@@ -59,6 +60,25 @@ def numbers(values: ArrayLike) -> FloatArray:
         return np.asarray(values, dtype=float)
     except (OverflowError, RecursionError) as error:
         raise ValueError(str(error)) from None
+
+
+def numbers_of(name: str, values: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
+    """Finite numbers of this shape, or ValueError by the name of the argument."""
+    try:
+        found = numbers(values)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} = {reprlib.repr(values)} are not numbers; give an array of shape {shape}") from None
+    if found.shape != shape or not np.all(np.isfinite(found)):
+        raise ValueError(f"{name} = {reprlib.repr(values)} is no array of {shape} finite numbers")
+    return found
+
+
+def box_of(bounds: ArrayLike) -> FloatArray:
+    """Corners (2, 3) of a box, or ValueError."""
+    box = numbers_of("bounds", bounds, (2, 3))
+    if not np.all(box[1] > box[0]):
+        raise ValueError(f"bounds {box.tolist()} are no box; give ((x0, y0, z0), (x1, y1, z1)) with x0 < x1 etc.")
+    return box
 
 
 def polar_angles(s: FloatArray) -> FloatArray:

@@ -130,7 +130,7 @@ class Cad(FittedBody):
         progress("reading the CAD file")
         found = read_cad(path, reading, progress=progress)
         jets = osculating_jets(found.mesh.vertices, found.mesh.triangles)
-        quality = _with_joints(assess(found.mesh, jets), found)
+        quality = _with_joints(assess(found.mesh.vertices, found.mesh.triangles, jets), found)
         if found.edges and strict:
             raise ValueError(f"{path.name} is not smooth: {'; '.join(found.edges[:6])}; round its edges off")
         notes = {"source": path.name, "edges": list(found.edges)}
@@ -144,14 +144,13 @@ class Cad(FittedBody):
             return PieceCloud(
                 mesh.vertices, mesh.triangles, regions, normals, quality, notes | {"repairs": list(mesh.repairs)}
             )
-        non_smooth = np.concatenate([found.mesh.vertices[quality.bad], found.non_smooth])
         return PointCloud(
             found.mesh.vertices,
             np.where(np.isfinite(found.normals), found.normals, jets.normals),
             edge=quality.edge_mean,
             spacing=SPACING * quality.edge_mean,
             noise=0.0,
-            non_smooth=non_smooth,
+            non_smooth=found.mesh.vertices[quality.bad],
             distance=partial(signed_distance, found.mesh.vertices, jets),
             mean_curvature=np.where(jets.fitted & ~quality.bad, jets.mean, np.nan),
             quality=quality,

@@ -8,13 +8,13 @@ Sources: [B78]; Derivations, B7.
 import hashlib
 import reprlib
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scatterers.base.level_body import LevelBody
-from scatterers.body import numbers
+from scatterers.body import box_of, numbers, numbers_of
 from scatterers.sphere_map.star import star_map
 from scatterers.spline.cloud import Samples
 from scatterers.spline.tensor import TensorSpline, coefficients
@@ -25,19 +25,6 @@ FEWEST = 8
 
 
 FloatArray = NDArray[np.float64]
-
-
-class Level(Protocol):
-    """What `Gridded.sampled` asks of the body that it samples."""
-
-    @property
-    def bounds(self) -> FloatArray:
-        """Box (2, 3) that contains the body, L."""
-        ...
-
-    def level(self, points: FloatArray) -> FloatArray:
-        """F, positive outside: points (..., 3), L, to (...)."""
-        ...
 
 
 class Gridded(LevelBody):
@@ -76,12 +63,10 @@ class Gridded(LevelBody):
     def __init__(
         self, samples: ArrayLike, bounds: ArrayLike, *, centre: ArrayLike | None = None, speed: Any = None
     ) -> None:
-        box = _numbers("bounds", bounds, (2, 3))
-        if not np.all(box[1] > box[0]):
-            raise ValueError(f"bounds {box.tolist()} are no box; give ((x0, y0, z0), (x1, y1, z1)) with x0 < x1 etc.")
+        box = box_of(bounds)
         nodes = _checked(samples)
         spacing = (box[1] - box[0]) / (np.array(nodes.shape) - 1)
-        given = None if centre is None else _numbers("centre", centre, (3,))
+        given = None if centre is None else numbers_of("centre", centre, (3,))
         self.speed = speed
         self._set_speed()
         spline = TensorSpline(coefficients(nodes), box[0], spacing)
@@ -100,7 +85,7 @@ class Gridded(LevelBody):
     @classmethod
     def sampled(
         cls,
-        body: Level,
+        body: Any,
         nodes: int | Sequence[int] = 64,
         margin: float = 0.15,
         *,
@@ -139,7 +124,7 @@ class Gridded(LevelBody):
             raise ValueError(f"nodes = {nodes!r}; give one or three whole numbers from {FEWEST} to {MOST}")
         if isinstance(margin, bool) or not isinstance(margin, (int, float)) or not 0 < margin <= 1e9:
             raise ValueError(f"margin = {margin!r} is not a positive finite number; give e.g. 0.15")
-        box = _numbers("bounds", body.bounds, (2, 3))
+        box = numbers_of("bounds", body.bounds, (2, 3))
         widened = margin * 0.5 * (box[1] - box[0])
         box = np.stack([box[0] - widened, box[1] + widened])
         x, y, z = (np.linspace(box[0, k], box[1, k], counts[k]) for k in range(3))
@@ -153,16 +138,6 @@ class Gridded(LevelBody):
 
     def _identity(self) -> str:
         return self._digest
-
-
-def _numbers(name: str, values: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
-    try:
-        found = numbers(values)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} = {reprlib.repr(values)} are not numbers; give an array of shape {shape}") from None
-    if found.shape != shape or not np.all(np.isfinite(found)):
-        raise ValueError(f"{name} = {values!r} is no array of {shape} finite numbers")
-    return found
 
 
 def _checked(samples: ArrayLike) -> FloatArray:

@@ -6,7 +6,6 @@ and curves along which max, min and where change their choice and the normal or 
 """
 
 import hashlib
-import reprlib
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
@@ -15,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scatterers.base.level_body import LevelBody
-from scatterers.body import SHARP, Crease, Piece, no_charts, numbers, positive
+from scatterers.body import SHARP, Crease, Piece, box_of, no_charts, numbers_of, positive
 from scatterers.cached import cached
 from scatterers.exact.clipped import clip, creases, march, normals
 from scatterers.exact.singularities import (
@@ -102,7 +101,7 @@ class Implicit(LevelBody):
         self.expression = expression
         self.speed = speed
         self._set_speed()
-        box = found_box(everywhere) if bounds is None else _box(bounds)
+        box = found_box(everywhere) if bounds is None else box_of(bounds)
         samples = samples_of(everywhere, box, FINE)
         examine(expression, samples, bounds is not None)
         if np.all(np.ptp(samples.inside, axis=0) < 0.5 * np.ptp(box, axis=0)):
@@ -110,7 +109,7 @@ class Implicit(LevelBody):
             box = np.clip(tightened(everywhere, samples), box[0], box[1])
             samples = samples_of(everywhere, box, FINE)
             examine(expression, samples, True)
-        given = None if centre is None else _point(centre)
+        given = None if centre is None else numbers_of("centre", centre, (3,))
         self._shape(expression, samples, given)
         tips = self._tips(samples, strict)
         along = self._found_creases(samples, strict)
@@ -256,23 +255,3 @@ class PiecewiseImplicit(Implicit):
         """Charts of a body without edges and tips; asking others for charts raises an error."""
         sharp = [crease for crease in self._creases if crease.kind in SHARP]
         return no_charts(sharp) if sharp else super().atlas
-
-
-def _box(bounds: ArrayLike) -> FloatArray:
-    try:
-        box = numbers(bounds)
-    except (TypeError, ValueError):
-        raise ValueError(f"bounds {reprlib.repr(bounds)} are not numbers; give ((x0, y0, z0), (x1, y1, z1))") from None
-    if box.shape != (2, 3) or not np.all(np.isfinite(box)) or not np.all(box[1] > box[0]):
-        raise ValueError(f"bounds {box.tolist()} are no box; give ((x0, y0, z0), (x1, y1, z1)) with x0 < x1 etc.")
-    return box
-
-
-def _point(centre: ArrayLike) -> FloatArray:
-    try:
-        point = numbers(centre)
-    except (TypeError, ValueError):
-        raise ValueError(f"centre {reprlib.repr(centre)} is not a point; give (x, y, z)") from None
-    if point.shape != (3,) or not np.all(np.isfinite(point)):
-        raise ValueError(f"centre {centre!r} is not a point; give (x, y, z)")
-    return point

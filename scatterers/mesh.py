@@ -273,7 +273,7 @@ def _examined(source: Any, units: str | None, choice: Choice, progress: Callable
     mesh, times = read_mesh(source, units, choice, progress=progress), choice.subdivide
     progress(f"normals of {len(mesh.vertices)} vertices")
     jets = osculating_jets(mesh.vertices, mesh.triangles)
-    quality, joints = _with_joints(assess(mesh, jets), mesh, jets)
+    quality, joints = _with_joints(assess(mesh.vertices, mesh.triangles, jets), mesh, jets)
     pieces = _pieces(mesh, quality, joints, source_name(source))
     if times is None or (times == "auto" and (quality.verdict != "too coarse" or pieces is not None)):
         return _Examined(mesh, jets, quality, pieces)
@@ -291,7 +291,7 @@ def _examined(source: Any, units: str | None, choice: Choice, progress: Callable
         found = TriangleMesh(loop.vertices, loop.triangles, (*mesh.repairs, *notes), loop)
         progress(f"normals of {len(found.vertices)} vertices")
         jets = osculating_jets(found.vertices, found.triangles)
-        quality = assess(found, jets)
+        quality = assess(found.vertices, found.triangles, jets)
         if quality.verdict != "too coarse" or len(found.vertices) >= FEWEST_SUBDIVIDED:
             break
     for line in found.repairs[len(mesh.repairs) :]:

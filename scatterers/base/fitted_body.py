@@ -5,25 +5,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.base.level_body import LevelBody
 from scatterers.base.quadrics import PieceCloud, PointCloud
 from scatterers.base.two_fits import good_fit, require_one_body
 from scatterers.body import Crease, Piece, teller
 from scatterers.pieces.fitting import fitted_pieces
-from scatterers.pieces.spline_body import SplinePieces
+from scatterers.pieces.spline_body import SplinePieces, packed, unpacked
 from scatterers.sphere_map.star import star_map
 from scatterers.spline import cache as _fit_cache
 from scatterers.spline.cloud import FitReport, Samples
-from scatterers.spline.tensor import TensorSpline
 from scatterers.triangles.quality import MeshQuality
 
 if TYPE_CHECKING:
     from scatterers.atlas.monge.atlas import MongeAtlas
     from scatterers.sphere_map.star import CubeSphereAtlas
 
-CHARTS, NO_CHARTS, FITS = "charts-", "no_charts", ("fine", "coarse")
+CHARTS, NO_CHARTS = "charts-", "no_charts"
 FEWEST = 0.1
 """Share of the points that has to be farther off, for a fit to mean anything."""
 SLACK = 0.02
@@ -33,15 +32,12 @@ OF_FACETS = ("part", "cap", "union", "progress")
 """Options that a body on its facets has as well,"""
 OF_ALL = ("cache",)
 """and those that mean nothing there."""
-
-
-FloatArray = NDArray[np.float64]
 Progress = Callable[[str], None]
 Kept = tuple[Path, str, dict[str, FloatArray], dict[str, Any]]
 
 
 class SplineBody(LevelBody):
-    """Body F = 0 of a spline, or of one for each of its smooth pieces; the second fit is one.
+    """Body F = 0 of the splines of a fit; the second fit is one.
 
     Attributes
     ----------
@@ -49,22 +45,22 @@ class SplineBody(LevelBody):
         Edges and seams of a body of pieces; empty if it is smooth.
     """
 
-    _parts: SplinePieces | None = None
+    _parts: SplinePieces
 
-    def __init__(self, fitted: TensorSpline | SplinePieces, digest: str, speed: Any) -> None:
+    def __init__(self, parts: SplinePieces, digest: str, speed: Any) -> None:
         self.speed = speed
         self._set_speed()
-        self._digest = digest
-        if isinstance(fitted, SplinePieces):
-            self._parts, self._space, self._map = fitted, fitted.space, None
-            corners = fitted.corners.reshape(-1, 3)
+        self._digest, self._parts, self._map = digest, parts, None
+        if self.pieces:
+            self.__dict__["compiled"] = parts.space.compiled
+            corners = parts.corners.reshape(-1, 3)
             slack = SLACK * np.ptp(corners, axis=0).max()
             self._bounds = np.stack([corners.min(axis=0) - slack, corners.max(axis=0) + slack])
             return
-        samples = Samples(fitted.at_nodes(), fitted.origin, fitted.spacing)
+        (spline,) = parts.space.splines
+        samples = Samples(spline.at_nodes(), spline.origin, spline.spacing)
         require_one_body(samples)
-        sphere_map, _ = star_map(fitted, samples, None)
-        self._place(fitted, samples, sphere_map)
+        self._place(spline, samples, star_map(spline, samples, None)[0])
 
     def _identity(self) -> str:
         return self._digest
@@ -76,33 +72,31 @@ class SplineBody(LevelBody):
     @property
     def creases(self) -> tuple[Crease, ...]:
         """Creases: edges, joints and tips at which smooth pieces meet or end."""
-        return () if self._parts is None else self._parts.creases
+        return self._parts.creases
 
     @property
     def pieces(self) -> tuple[Piece, ...]:
         """The smooth pieces; empty if the whole body is smooth."""
-        return () if self._parts is None else self._parts.surfaces
+        return self._parts.surfaces if len(self._parts.corners) else ()
 
     @property
     def corners(self) -> FloatArray | None:
         """Corners (m, 3, 3), L, of the triangles that the pieces were fitted to; None if the whole body is smooth."""
-        return None if self._parts is None else self._parts.corners
+        return self._parts.corners if self.pieces else None
 
-    def piece(self, points: FloatArray) -> NDArray[np.int64]:
+    def piece(self, points: FloatArray) -> IntArray:
         """Number of the piece nearest to points (..., 3), L, which lie near the body: (...)."""
-        if self._parts is None:
-            return np.zeros(np.shape(points)[:-1], dtype=np.int64)
         return self._parts.space.numbers(points)
 
-    def tiles(self, edge: float) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
+    def tiles(self, edge: float) -> tuple[FloatArray, FloatArray, IntArray]:
         """Triangulate the pieces, with sides of at most ``edge``, L: corners, normals (m, 3, 3), piece numbers (m,)."""
-        if self._parts is None:
+        if not self.pieces:
             raise ValueError("a body that is smooth as a whole has no pieces; its charts cover it")
         return self._parts.tiles(edge)
 
-    def non_smooth(self, points: FloatArray) -> NDArray[np.bool_]:
+    def non_smooth(self, points: FloatArray) -> BoolArray:
         """Whether the body near points (..., 3), L, is too rough, or too uncertain, for creeping rays: (...)."""
-        return super().non_smooth(points) if self._parts is None else self._parts.non_smooth(points)
+        return self._parts.non_smooth(points)
 
     @property
     def quick_charts(self) -> bool:
@@ -110,7 +104,7 @@ class SplineBody(LevelBody):
         return self._map is not None
 
     def _covered(self) -> "CubeSphereAtlas | MongeAtlas":
-        if self._parts is not None:
+        if self.pieces:
             raise ValueError("a body with edges has no charts; its rays go by direct integration")
         return super()._covered()
 
@@ -180,21 +174,18 @@ class FittedBody(SplineBody):
         found = None if folder is None else _fit_cache.load(folder, key)
         if found is not None:
             try:
-                self._describe(*found)
-                known = [_unpacked(found[0], name) for name in FITS]
-            except (TypeError, ValueError, KeyError, AttributeError):
+                parts, coarse = self._taken(*found)
+            except (TypeError, ValueError, KeyError, AttributeError, IndexError):
                 # signed, and yet none of ours
                 progress("the stored fit is damaged: fitting again")
                 found = None
-        arrays, text = found or self._fitted(make(), progress)
+        arrays, text = found or _fitted(make(), progress)
         if found is None:
-            self._describe(arrays, text)
-            known = [_unpacked(arrays, name) for name in FITS]
+            parts, coarse = self._taken(arrays, text)
         self._charts = {name[len(CHARTS) :]: array for name, array in arrays.items() if name.startswith(CHARTS)}
-        super().__init__(known[0], key, speed)
+        super().__init__(parts, key, speed)
         self._no_charts = str(text.get(NO_CHARTS, ""))
-        self.coarse_fit = SplineBody(known[1], f"{key}, second", speed)
-        self.coarse_fit._non_smooth, self.coarse_fit._reach = self._non_smooth, self._reach
+        self.coarse_fit = SplineBody(coarse, f"{key}, second", speed)
         self._kept: Kept | None = None
         if folder is not None:
             self._kept = folder, key, arrays, text
@@ -224,29 +215,30 @@ class FittedBody(SplineBody):
         """Ratio of the error of the body to its difference from ``coarse_fit``."""
         return self.fit.factor
 
-    def _describe(self, arrays: dict[str, FloatArray], text: dict[str, Any]) -> None:
-        """Take over what is known of the fit."""
+    def _taken(self, arrays: dict[str, FloatArray], text: dict[str, Any]) -> tuple[SplinePieces, SplinePieces]:
+        """The body and its second fit; takes over what is known of it."""
         self.fit = FitReport.from_json(text["fit"])
         self.quality = MeshQuality.from_json(text["quality"], arrays["badness"])
         self.repairs = tuple(text["repairs"])
         self._text = text
-        self._non_smooth, self._reach = arrays["rough"], float(text["reach"])
+        parts = SplinePieces.restored(arrays, unpacked(arrays, "fine"))
+        return parts, parts.with_splines(unpacked(arrays, "coarse"))
 
-    def _fitted(
-        self, cloud: PointCloud | PieceCloud, progress: Progress
-    ) -> tuple[dict[str, FloatArray], dict[str, Any]]:
-        """Arrays and text of the fits, checked."""
-        if isinstance(cloud, PieceCloud):
-            return _fitted_pieces(cloud, progress)
+
+def _fitted(cloud: PointCloud | PieceCloud, progress: Progress) -> tuple[dict[str, FloatArray], dict[str, Any]]:
+    """Arrays and text of both fits, checked."""
+    if isinstance(cloud, PieceCloud):
+        fitted = fitted_pieces(cloud.vertices, cloud.triangles, cloud.regions, progress, cloud.normals, cloud.noise)
+        parts = SplinePieces.of(fitted, cloud.vertices[cloud.triangles])
+        coarse, report = [patch.coarse for patch in fitted.patches], fitted.report()
+    else:
         _require_smooth_points(cloud)
         found = good_fit(cloud, progress)
-        arrays = (
-            {"rough": found.non_smooth, "badness": cloud.quality.badness}
-            | _packed(found.fine.spline, "fine")
-            | _packed(found.coarse.spline, "coarse")
-        )
-        text = {"fit": found.report.to_json(), "quality": cloud.quality.to_json(), "reach": cloud.reach}
-        return arrays, text | cloud.notes
+        parts = SplinePieces.whole(found.fine.spline, found.non_smooth, cloud.reach)
+        coarse, report = [found.coarse.spline], found.report
+    arrays = parts.arrays() | packed(parts.space.splines, "fine") | packed(coarse, "coarse")
+    text = {"fit": report.to_json(), "quality": cloud.quality.to_json()}
+    return arrays | {"badness": cloud.quality.badness}, text | cloud.notes
 
 
 def checked_options(units: Any, strict: Any, cache: Any, progress: Any) -> Progress:
@@ -260,17 +252,6 @@ def checked_options(units: Any, strict: Any, cache: Any, progress: Any) -> Progr
     return teller(progress)
 
 
-def _fitted_pieces(cloud: PieceCloud, progress: Progress) -> tuple[dict[str, FloatArray], dict[str, Any]]:
-    """Arrays and text of the fits of all pieces."""
-    fitted = fitted_pieces(cloud.vertices, cloud.triangles, cloud.regions, progress, cloud.normals, cloud.noise)
-    corners = cloud.vertices[cloud.triangles]
-    arrays = {"rough": np.zeros((0, 3)), "badness": cloud.quality.badness}
-    for name in FITS:
-        arrays |= SplinePieces.of(fitted, corners, coarse=name == "coarse").arrays(name)
-    text = {"fit": fitted.report().to_json(), "quality": cloud.quality.to_json(), "reach": 0.0}
-    return arrays, text | cloud.notes
-
-
 def _require_smooth_points(cloud: PointCloud) -> None:
     """ValueError if hardly a point is left when those about non-smooth places are taken away."""
     if not len(cloud.non_smooth) or np.mean(cloud.smooth) >= FEWEST:
@@ -279,17 +260,3 @@ def _require_smooth_points(cloud: PointCloud) -> None:
         f"{np.sum(~cloud.smooth)} of {len(cloud.points)} points lie within {cloud.reach:.3g} m of places where the "
         "body is not smooth, and nothing is known there; refine the mesh"
     )
-
-
-def _packed(spline: TensorSpline, name: str) -> dict[str, FloatArray]:
-    return {
-        f"{name}-coefficients": spline.coefficients,
-        f"{name}-grid": np.stack([spline.origin, spline.spacing]),
-    }
-
-
-def _unpacked(arrays: dict[str, FloatArray], name: str) -> TensorSpline | SplinePieces:
-    if f"{name}-table" in arrays:
-        return SplinePieces.restored(arrays, name)
-    origin, spacing = arrays[f"{name}-grid"]
-    return TensorSpline(np.ascontiguousarray(arrays[f"{name}-coefficients"], dtype=float), origin, spacing)

@@ -7,11 +7,11 @@ charts; any other body has the Monge charts of `scatterers.atlas.monge.atlas`.
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from creeping._typing import BoolArray, FloatArray
+from creeping._typing import FloatArray
 from scatterers.body import Body, Levelled, polar_angles
 from scatterers.cached import cached
 from scatterers.kernels.compiled import Compiled
@@ -35,9 +35,6 @@ class LevelBody(Levelled, Body):
     _space: SpaceLevel
     _map: RadialMap | None
     _bounds: FloatArray
-    # places where the body is not smooth, and how far from them rays are not trusted
-    _non_smooth: FloatArray = np.zeros((0, 3))
-    _reach: float = 0.0
     # why there are none, once that is known
     _no_charts: str = ""
     # charts found before
@@ -46,7 +43,7 @@ class LevelBody(Levelled, Body):
     def _place(self, space: SpaceLevel, samples: Samples, sphere_map: RadialMap | None) -> None:
         """Take F, its samples and the sphere map, None for a body that has none."""
         self._space, self._map = space, sphere_map
-        for made in ("compiled", "atlas", "_non_smooth_tree"):
+        for made in ("compiled", "atlas"):
             self.__dict__.pop(made, None)
         low, high = samples.inside
         reach = np.stack([low - 1.5 * samples.spacing, high + 1.5 * samples.spacing])
@@ -70,22 +67,6 @@ class LevelBody(Levelled, Body):
     def star_shaped(self) -> bool:
         """Whether the body has a sphere map."""
         return self._map is not None
-
-    def non_smooth(self, points: FloatArray) -> BoolArray:
-        """Whether points (..., 3), L, lie where the body is not smooth enough for creeping rays: (...)."""
-        points = np.asarray(points, dtype=float)
-        found = np.zeros(points.shape[:-1], dtype=bool)
-        if len(self._non_smooth):
-            finite = np.all(np.isfinite(points), axis=-1)
-            distance, _ = self._non_smooth_tree.query(points[finite], distance_upper_bound=self._reach)
-            found[finite] = np.isfinite(distance)
-        return found
-
-    @cached_property
-    def _non_smooth_tree(self) -> Any:
-        from scipy.spatial import cKDTree
-
-        return cKDTree(self._non_smooth)
 
     def parameters(self, points: FloatArray) -> FloatArray:
         """Polar angle theta in [0, pi] and azimuth phi in (-pi, pi], radians: (..., 3) -> (..., 2).

@@ -19,16 +19,18 @@ from scatterers.spline.cloud import (
     FitReport,
     Samples,
     curvatures,
+    differences,
     left_at,
     normal_curvatures,
     principal_curvatures,
+    rms,
     tangents,
 )
-from scatterers.spline.fitting import MAX_NODES, SMOOTHING, Fitted, fit, spacing_of
+from scatterers.spline.fitting import COARSER, MAX_NODES, SMOOTHING, Fitted, fit, spacing_of
 from scatterers.triangles.subdivision import BLIND, Source, turns, unseen
 
-COARSENING, FINER = 1.35, 0.75
-"""Spacing of the second fit, in units of the first, and to points nearer to the source."""
+FINER = 0.75
+"""Spacing of the second fit, in units of the first, to points nearer to the source."""
 SMOOTHINGS = (1e-6, 1e-5, 1e-4, 1e-3)
 """Tried in turn on noisy points, until the misfit exceeds the noise,"""
 EXCESS = 1.01
@@ -163,13 +165,13 @@ def fits(cloud: PointCloud, progress: Progress) -> tuple[Fitted, Fitted, float]:
     if cloud.nearer is None:
         # fits to the same noise err alike
         fewer = np.random.default_rng(0).random(len(cloud.points)) < SECOND if noisy else slice(None)
-        other = fitted(cloud, COARSENING * cloud.spacing, smoothing, plain, fewer)
+        other = fitted(cloud, COARSER * cloud.spacing, smoothing, plain, fewer)
     else:
         finest = spacing_of(cloud.nearer.points, MAX_NODES)
         other = fitted(cloud.nearer, max(FINER * cloud.spacing, finest), smoothing, plain)
         if not _one_body(_samples(other)):
             # between points that are too far apart for it
-            other = fitted(cloud.nearer, COARSENING * cloud.spacing, smoothing, plain)
+            other = fitted(cloud.nearer, COARSER * cloud.spacing, smoothing, plain)
     _require_one_body(other, cloud)
     return fine, other, smoothing
 
@@ -183,20 +185,19 @@ def compared(cloud: PointCloud, fine: Fitted, coarse: Fitted, smoothing: float) 
     points, normals = cloud.points, cloud.normals
     if len(cloud.non_smooth):
         points, normals = points[cloud.smooth], normals[cloud.smooth]
-    along = tangents(normals)[0]
-    found = [curvatures(one.spline, points, along) for one in (fine, coarse)]
-    (kappa, gauss, slope), (other_kappa, other_gauss, _) = found
-
-    shared, shared_gauss = _shared(cloud, fine, _rms(kappa))
+    found = differences([(fine.spline, coarse.spline, points, normals)])
+    shared, shared_gauss = _shared(cloud, fine, found["normal_curvature"])
     misfit, turn = fine.misfit, fine.turn
     if cloud.nearer is not None:
         misfit, turn = left_at(fine.spline, cloud.nearer.points, cloud.nearer.normals)
         misfit = max(misfit, left_at(fine.spline, cloud.nearer.source.vertices)[0])
+        kappa, gauss, _ = curvatures(fine.spline, points, tangents(normals)[0])
         # a body that is off by t has kappa off by kappa^2 t, and K by (kappa_1 + kappa_2) K t
-        shared = float(np.hypot(shared, _rms(kappa**2) * misfit))
-        shared_gauss = float(np.hypot(shared_gauss, _rms(kappa.reshape(2, -1).sum(axis=0) * gauss) * misfit))
-    difference = _rms(kappa - other_kappa)
-    error = float(np.hypot(difference, shared))
+        shared = float(np.hypot(shared, rms(kappa**2) * misfit))
+        shared_gauss = float(np.hypot(shared_gauss, rms(kappa.reshape(2, -1).sum(axis=0) * gauss) * misfit))
+    difference = found["normal_curvature_error"]
+    found["normal_curvature_error"] = float(np.hypot(difference, shared))
+    found["gaussian_curvature_error"] = float(np.hypot(found["gaussian_curvature_error"], shared_gauss))
     report = FitReport(
         points=len(cloud.points),
         spacing=fine.spacing,
@@ -204,16 +205,12 @@ def compared(cloud: PointCloud, fine: Fitted, coarse: Fitted, smoothing: float) 
         nodes=tuple(n - 4 for n in fine.spline.coefficients.shape),
         misfit=misfit,
         turn=turn,
-        slope=(float(slope.min()), float(slope.max())),
-        normal_curvature=_rms(kappa),
-        normal_curvature_error=error,
-        gaussian_curvature=_rms(gauss),
-        gaussian_curvature_error=float(np.hypot(_rms(gauss - other_gauss), shared_gauss)),
         noise=cloud.noise,
         smoothing=smoothing,
-        factor=error / difference if cloud.nearer is not None and difference > 0 else 1.0,
+        factor=found["normal_curvature_error"] / difference if cloud.nearer is not None and difference > 0 else 1.0,
+        **found,
     )
-    return report, error / report.normal_curvature
+    return report, report.normal_curvature_error / report.normal_curvature
 
 
 def _shared(cloud: PointCloud, fine: Fitted, rms_kappa: float) -> tuple[float, float]:
@@ -230,10 +227,6 @@ def _shared(cloud: PointCloud, fine: Fitted, rms_kappa: float) -> tuple[float, f
     shared = fine.turn / fine.spacing
     # K = k1 k2, both off by as much, kappa taken along two directions at right angles
     return shared, float(np.sqrt(2)) * rms_kappa * shared
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _samples(fitted: Fitted) -> Samples:

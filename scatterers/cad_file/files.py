@@ -31,12 +31,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.triangles.decks import what_else
 from scatterers.triangles.files import UNITS, TriangleMesh
+from scatterers.triangles.jets import angle_weighted_normals
 from scatterers.triangles.quality import Choice, whole_body
-from scatterers.triangles.topology import cleaned, edges_of
+from scatterers.triangles.topology import Edges, cleaned, edges_of, flat_normals, next_corner
 
 SUFFIXES = {".step": "STEP", ".stp": "STEP", ".iges": "IGES", ".igs": "IGES", ".brep": "BREP"}
 BEGINNINGS = {"STEP": r"\s*ISO-10303-21", "IGES": r".{72}[SFG]", "BREP": r"\s*(DBRep_DrawableShape|CASCADE Topology)"}
@@ -62,8 +63,6 @@ FLAT = 1e-3
 """Curvature times edge below which a face counts as plane."""
 
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Note = Callable[[str], None]
 
 
@@ -86,18 +85,15 @@ class CadPoints:
         Edges at which faces join smoothly while the curvature jumps, as where a fillet meets a plane.
     edges : tuple of str
         Where faces do not join smoothly.
-    non_smooth : (k, 3), m
-        Vertices there.
     """
 
     mesh: TriangleMesh
     normals: FloatArray
     corner_normals: FloatArray
-    creases: NDArray[np.bool_]
-    level: NDArray[np.bool_]
-    jumps: NDArray[np.bool_]
+    creases: BoolArray
+    level: BoolArray
+    jumps: BoolArray
     edges: tuple[str, ...]
-    non_smooth: FloatArray
 
 
 @dataclass(frozen=True)
@@ -153,13 +149,15 @@ def read_cad(path: Path, reading: CadReading, *, curved: int = 0, progress: Call
     at = row[found["at"]]
     # faces of solids that are left out may touch the body
     known = (at >= 0) & np.isin(found["face"], of)
-    normals, edges, sharp = _joined(mesh, at[known], found["face"][known], found["normals"][known])
     for line in repairs:
         progress(line)
-    corners = _corner_normals(mesh, of, at[known], found["face"][known], found["normals"][known])
-    creases, level = _creases(mesh, of, corners)
+    corners, there = _corner_normals(mesh, of, at[known], found["face"][known], found["normals"][known])
+    edges = edges_of(mesh.triangles)
+    creases, level, turns = _creases(mesh, edges, of, corners)
     jumps = curvature_jumps(mesh.vertices, mesh.triangles, of, corners, level)
-    return CadPoints(mesh, normals, corners, creases, level, jumps, edges, mesh.vertices[sharp])
+    texts = _edge_texts(edges, of, creases, turns)
+    normals = _vertex_normals(mesh, corners, there)
+    return CadPoints(mesh, normals, corners, creases, level, jumps, texts)
 
 
 def cad_triangles(path: Path, reading: CadReading, *, progress: Callable[[str], None]) -> TriangleMesh:
@@ -289,7 +287,7 @@ def _without_strings(text: str) -> str:
     return out + text[k:]
 
 
-def _meshed(path: Path, points: int, sew: float | None, curved: int) -> dict[str, NDArray[np.generic]]:
+def _meshed(path: Path, points: int, sew: float | None, curved: int) -> dict[str, Any]:
     """Run the worker and read what it wrote."""
     with tempfile.TemporaryDirectory(prefix="creeping-") as folder:
         out = Path(folder) / "points.npz"
@@ -330,11 +328,15 @@ def _faces_of(triangles: IntArray, before: IntArray, faces: IntArray) -> IntArra
     return np.where(known[found] == wanted, faces[found], -1)
 
 
-def _corner_normals(mesh: TriangleMesh, of: IntArray, at: IntArray, face: IntArray, normals: FloatArray) -> FloatArray:
-    """Outward normals (m, 3, 3) of the triangles' own faces at their corners; the triangle's where a face has none."""
+def _corner_normals(
+    mesh: TriangleMesh, of: IntArray, at: IntArray, face: IntArray, normals: FloatArray
+) -> tuple[FloatArray, BoolArray]:
+    """Outward normals (m, 3, 3) of the triangles' own faces at their corners, and where these have one (m, 3).
+
+    Else it is the triangle's.
+    """
     corners = mesh.vertices[mesh.triangles]
-    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
+    flat = flat_normals(corners)[0]
     size = len(mesh.vertices)
     known = face * size + at
     order = np.argsort(known, kind="stable")
@@ -348,68 +350,55 @@ def _corner_normals(mesh: TriangleMesh, of: IntArray, at: IntArray, face: IntArr
         if np.sum((n[mine] * flat[mine, None])[there[mine]]) < 0:
             n[mine] *= -1
     there &= np.sum(n * flat[:, None], axis=2) > np.cos(np.radians(FAR_OFF))
-    return np.where(there[..., None], n, flat[:, None])
+    return np.where(there[..., None], n, flat[:, None]), there
 
 
-def _creases(mesh: TriangleMesh, of: IntArray, normals: FloatArray) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Edges between faces whose normals differ there, and between others; those of a mesh where no face is known."""
+def _creases(
+    mesh: TriangleMesh, edges: Edges, of: IntArray, normals: FloatArray
+) -> tuple[BoolArray, BoolArray, FloatArray]:
+    """Edges between faces whose normals differ there, and between others; and by how much, degrees.
+
+    Where no face is known they are those of a mesh.
+    """
     from scatterers.pieces.regions import regions_of
-    from scatterers.triangles.topology import edges_of
 
-    edges = edges_of(mesh.triangles)
-    order = np.argsort(edges.number, kind="stable").reshape(-1, 2)
+    order = edges.sides
     between = of[order[:, 0] // 3] != of[order[:, 1] // 3]
     flat = normals.reshape(-1, 3)
     left, right = order[:, 0], order[:, 1]
     # the edge runs from corner k to the next in one triangle, the other way in the other
-    after = np.where(left % 3 == 2, left - 2, left + 1), np.where(right % 3 == 2, right - 2, right + 1)
-    turns = [np.linalg.norm(flat[a] - flat[b], axis=1) for a, b in ((left, after[1]), (after[0], right))]
-    sharp = between & (np.minimum(*turns) > 2 * np.sin(np.radians(SHARP) / 2))
+    apart = [np.linalg.norm(flat[a] - flat[next_corner(b)], axis=1) for a, b in ((left, right), (right, left))]
+    turns = np.degrees(2 * np.arcsin(np.minimum(*apart) / 2))
+    sharp = between & (turns > SHARP)
     # lids, and triangles that were cut as parts were united
     lost = (of[order[:, 0] // 3] < 0) | (of[order[:, 1] // 3] < 0)
     if lost.any():
         sharp = np.where(lost, regions_of(mesh.vertices, mesh.triangles).crease, sharp)
-    return sharp, between & ~sharp & ~lost
+    return sharp, between & ~sharp & ~lost, turns
 
 
-def _joined(
-    mesh: TriangleMesh, at: IntArray, face: IntArray, normals: FloatArray
-) -> tuple[FloatArray, tuple[str, ...], IntArray]:
-    """Outward normal of each vertex, the edges, and the vertices on them."""
-    from scatterers.triangles.jets import angle_weighted_normals
-
-    coarse_normals = angle_weighted_normals(mesh.vertices, mesh.triangles)
-    length = np.linalg.norm(normals, axis=1)
-    with np.errstate(invalid="ignore"):
-        normals = normals / length[:, None]
-    # a face's orientation is that of its parameters
-    for tag in np.unique(face):
-        mine = face == tag
-        if np.nanmedian(np.sum(normals[mine] * coarse_normals[at[mine]], axis=1)) < 0:
-            normals[mine] *= -1
-    uncertain = ~(np.sum(normals * coarse_normals[at], axis=1) > np.cos(np.radians(UNCERTAIN)))
-    n = len(mesh.vertices)
-    # at an edge all faces disagree with the triangles, and rightly
-    trusted = np.bincount(at[~uncertain], minlength=n)
-    alone = np.bincount(at, minlength=n) < 2
-    normals[uncertain & (alone | (trusted > 0))[at]] = np.nan
-    total = np.zeros((n, 3))
-    finite = np.all(np.isfinite(normals), axis=1)
-    np.add.at(total, at[finite], normals[finite])
+def _vertex_normals(mesh: TriangleMesh, corners: FloatArray, known: BoolArray) -> FloatArray:
+    """Mean of the faces' normals at each vertex (n, 3), NaN where no face has one that agrees with the triangles."""
+    total = np.zeros((len(mesh.vertices), 3))
+    np.add.at(total, mesh.triangles[known], corners[known])
     with np.errstate(invalid="ignore"):
         mean = total / np.linalg.norm(total, axis=1, keepdims=True)
-    away = np.degrees(np.arccos(np.clip(np.sum(normals * mean[at], axis=1), -1, 1)))
-    sharp = np.unique(at[finite & (2 * away > SHARP)])
-    edges: dict[tuple[int, ...], list[float]] = {}
-    for vertex in sharp:
-        mine = at == vertex
-        edges.setdefault(tuple(sorted(face[mine].tolist())), []).append(2 * float(np.nanmax(away[mine])))
-    lines = [
-        f"edge between faces {' and '.join(map(str, faces))}: {max(angles):.0f} deg at {len(angles)} points"
-        for faces, angles in sorted(edges.items(), key=lambda item: -len(item[1]))
-        if len(faces) == 2
-    ]
-    return mean, tuple(lines), sharp
+    along = np.sum(mean * angle_weighted_normals(mesh.vertices, mesh.triangles), axis=1)
+    mean[~(along > np.cos(np.radians(UNCERTAIN)))] = np.nan
+    return np.asarray(mean)
+
+
+def _edge_texts(edges: Edges, of: IntArray, creases: BoolArray, turns: FloatArray) -> tuple[str, ...]:
+    """The creases in words, those with most points first."""
+    at = np.flatnonzero(creases & (turns > SHARP))
+    pairs, which = np.unique(np.sort(of[edges.sides[at] // 3], axis=1), axis=0, return_inverse=True)
+    found = []
+    for k, (first, second) in enumerate(pairs.tolist()):
+        mine = at[which.ravel() == k]
+        count = len(np.unique(edges.ends[mine]))
+        angle = np.max(turns[mine])
+        found.append((count, f"edge between faces {first} and {second}: {angle:.0f} deg at {count} points"))
+    return tuple(text for _, text in sorted(found, key=lambda row: -row[0]))
 
 
 def cleaned_apart(
@@ -446,8 +435,8 @@ def cleaned_apart(
 
 
 def curvature_jumps(
-    vertices: FloatArray, triangles: IntArray, faces: IntArray, normals: FloatArray, level: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
+    vertices: FloatArray, triangles: IntArray, faces: IntArray, normals: FloatArray, level: BoolArray
+) -> BoolArray:
     """Edges (e,) of the joints of two faces along which the curvature jumps.
 
     Parameters
@@ -464,13 +453,14 @@ def curvature_jumps(
     if not level.any():
         return jumps
     at = np.flatnonzero(level)
-    order = np.argsort(edges_of(triangles).number, kind="stable").reshape(-1, 2)[level]
+    order = edges_of(triangles).sides[level]
     bends = np.stack([_bend(vertices, triangles, normals, side) for side in order.T], axis=1)
     sides = np.sort(faces[order // 3], axis=1)
     _, joint = np.unique(sides, axis=0, return_inverse=True)
     # always minus the one of the lower face
     bends = np.where((faces[order[:, :1] // 3] == sides[:, :1]), bends, bends[:, ::-1])
-    length = np.linalg.norm(vertices[triangles.ravel()[order[:, 0]]] - vertices[_next(triangles, order[:, 0])], axis=1)
+    vertex, first = triangles.ravel(), order[:, 0]
+    length = np.linalg.norm(vertices[vertex[first]] - vertices[vertex[next_corner(first)]], axis=1)
     for number in range(int(joint.max()) + 1):
         mine = joint.ravel() == number
         jump = abs(float(np.median(bends[mine, 0] - bends[mine, 1])))
@@ -478,11 +468,6 @@ def curvature_jumps(
         if larger * float(np.median(length[mine])) > FLAT and jump > JUMP * larger:
             jumps[at[mine]] = True
     return jumps
-
-
-def _next(triangles: IntArray, corner: IntArray) -> IntArray:
-    """Vertex that follows a corner (k,) of the flat triangles."""
-    return np.asarray(triangles.ravel()[np.where(corner % 3 == 2, corner - 2, corner + 1)])
 
 
 def _bend(vertices: FloatArray, triangles: IntArray, normals: FloatArray, corner: IntArray) -> FloatArray:

@@ -18,12 +18,12 @@ Sources: [C76, sec. 2-2].
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import permutations
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.body import Crease
+from scatterers.body import Crease, Levelled
 
 NEWTON = 20
 HALVINGS = 45
@@ -51,22 +51,6 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
-class Level(Protocol):
-    """F with its derivatives."""
-
-    def level(self, points: FloatArray) -> FloatArray:
-        """F: points (..., 3), L, to (...)."""
-        ...
-
-    def gradient(self, points: FloatArray) -> FloatArray:
-        """Gradient of F: points (..., 3), L, to (..., 3)."""
-        ...
-
-    def hessian(self, points: FloatArray) -> FloatArray:
-        """Hessian of F: points (..., 3), L, to (..., 3, 3)."""
-        ...
-
-
 @dataclass(frozen=True, eq=False)
 class Clipped:
     """Triangles each on one piece, and the cuts between them.
@@ -92,8 +76,8 @@ class Clipped:
 
 
 def clip(
-    body: Level,
-    pieces: Sequence[Level],
+    body: Levelled,
+    pieces: Sequence[Levelled],
     numbers: Callable[[FloatArray], IntArray],
     points: FloatArray,
     triangles: IntArray,
@@ -144,8 +128,8 @@ def clip(
 
 
 def _on_both(
-    body: Level,
-    pieces: Sequence[Level],
+    body: Levelled,
+    pieces: Sequence[Levelled],
     numbers: Callable[[FloatArray], IntArray],
     a: FloatArray,
     b: FloatArray,
@@ -177,7 +161,7 @@ def _step(value: FloatArray, gradient: FloatArray) -> FloatArray:
         return np.asarray(np.nan_to_num((value / np.sum(gradient**2, axis=-1))[..., None] * gradient))
 
 
-def _on_all(pieces: Sequence[Level], points: FloatArray, which: IntArray) -> FloatArray:
+def _on_all(pieces: Sequence[Levelled], points: FloatArray, which: IntArray) -> FloatArray:
     """Points (n, 3) moved to where the levels of their pieces (n, k) are all 0."""
     points = points.copy()
     for numbers in np.unique(which, axis=0):
@@ -191,7 +175,7 @@ def _on_all(pieces: Sequence[Level], points: FloatArray, which: IntArray) -> Flo
     return points
 
 
-def _normals(pieces: Sequence[Level], points: FloatArray, which: IntArray) -> FloatArray:
+def _normals(pieces: Sequence[Levelled], points: FloatArray, which: IntArray) -> FloatArray:
     found = np.zeros(points.shape)
     for k in np.unique(which):
         gradient = pieces[k].gradient(points[which == k])
@@ -200,12 +184,12 @@ def _normals(pieces: Sequence[Level], points: FloatArray, which: IntArray) -> Fl
     return found
 
 
-def normals(pieces: Sequence[Level], corners: FloatArray, which: IntArray) -> FloatArray:
+def normals(pieces: Sequence[Levelled], corners: FloatArray, which: IntArray) -> FloatArray:
     """Unit normals (m, 3, 3) of pieces (m,) at the corners (m, 3, 3), L, of their triangles."""
     return _normals(pieces, corners.reshape(-1, 3), np.repeat(which, 3)).reshape(corners.shape)
 
 
-def creases(pieces: Sequence[Level], clipped: Clipped, spacing: float) -> list[Crease]:
+def creases(pieces: Sequence[Levelled], clipped: Clipped, spacing: float) -> list[Crease]:
     """Edges, joints and seams along the cuts of a triangulation with this spacing, L.
 
     What is shorter than the spacing is not resolved: several pieces that meet in a point seem to have curves there.
@@ -228,7 +212,7 @@ def creases(pieces: Sequence[Level], clipped: Clipped, spacing: float) -> list[C
     return found
 
 
-def _bent(one: Level, other: Level, points: FloatArray) -> bool:
+def _bent(one: Levelled, other: Levelled, points: FloatArray) -> bool:
     """Whether the curvatures of two pieces differ somewhere along a curve."""
     of_each = []
     for piece in (one, other):

@@ -20,6 +20,7 @@ their vertices lie on Q = 0 and their triangles face along grad Q, but at the ti
 Sources: Derivations, B13.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -28,7 +29,6 @@ from numpy.typing import NDArray
 
 from scatterers.body import Crease
 from scatterers.pieces.patch import (
-    COARSER,
     SLIGHT,
     SPACING,
     TIP,
@@ -42,11 +42,11 @@ from scatterers.pieces.patch import (
 )
 from scatterers.pieces.regions import Regions
 from scatterers.pieces.selection import PieceSpace, piece_space, voxel_side
-from scatterers.spline.cloud import FitReport, curvatures, tangents
-from scatterers.spline.fitting import SMOOTHING
+from scatterers.spline.cloud import FitReport, curvatures, differences, rms
+from scatterers.spline.fitting import COARSER, SMOOTHING
 from scatterers.triangles.jets import FEWEST, Jets, angle_weighted_normals, osculating_jets
 from scatterers.triangles.quality import BAD
-from scatterers.triangles.topology import components
+from scatterers.triangles.topology import components, flat_normals
 
 FOLD = 3.0
 """Spacings of the grid within which opposite normals make a fold."""
@@ -124,7 +124,7 @@ class FittedPieces:
 
     Attributes
     ----------
-    fine, coarse : PieceSpace
+    space : PieceSpace
     patches : tuple of Patch
     piece : (m,)
         Of each triangle of the mesh.
@@ -140,8 +140,7 @@ class FittedPieces:
         vertices at which a fit turns away from the normals of its triangles or faces: it does not follow them.
     """
 
-    fine: PieceSpace
-    coarse: PieceSpace
+    space: PieceSpace
     patches: tuple[Patch, ...]
     piece: IntArray
     normals: FloatArray
@@ -155,41 +154,26 @@ class FittedPieces:
         """How well the pieces meet their points, and how their curvatures depend on the grid away from edges."""
         from scipy.spatial import cKDTree
 
-        found = []
         edges = [crease.points for crease in self.creases if crease.kind == "edge"]
         off = cKDTree(np.concatenate(edges)).query(self.samples)[0] if edges else np.full(len(self.samples), np.inf)
+        known = []
         for k, patch in enumerate(self.patches):
             points = self.samples[(self.owner == k) & (off > 2 * patch.spacing)]
             if len(points) and not self.rough[k]:
-                along = tangents(patch.fine.gradient(points))[0]
-                found.append([curvatures(spline, points, along) for spline in (patch.fine, patch.coarse)])
+                known.append((patch.fine, patch.coarse, points, patch.fine.gradient(points)))
         fitted = [patch for patch in self.patches if patch.kind == "spline"]
         spacing = float(np.median([patch.fine.spacing[0] for patch in fitted])) if fitted else 0.0
-        largest = max(
-            (patch.fine.coefficients.shape for patch in fitted),
-            key=lambda shape: float(np.prod(shape)),
-            default=(6, 6, 6),
-        )
-
-        def rms(parts: list[FloatArray]) -> float:
-            values = np.concatenate([np.zeros(1), *parts])
-            return float(np.sqrt(np.mean(values**2)))
-
-        slope = np.concatenate([np.ones(1), *(fine[2] for fine, _ in found)])
+        shapes = [patch.fine.coefficients.shape for patch in fitted] or [(6, 6, 6)]
         return FitReport(
             points=len(self.samples),
             spacing=spacing,
             coarser_spacing=COARSER * spacing,
-            nodes=tuple(n - 4 for n in largest),
-            misfit=rms([np.full(1, patch.misfit) for patch in fitted]),
-            turn=rms([patch.turn * np.ones(1) for patch in fitted]),
-            slope=(float(slope.min()), float(slope.max())),
-            normal_curvature=rms([fine[0] for fine, _ in found]),
-            normal_curvature_error=rms([fine[0] - coarse[0] for fine, coarse in found]),
-            gaussian_curvature=rms([fine[1] for fine, _ in found]),
-            gaussian_curvature_error=rms([fine[1] - coarse[1] for fine, coarse in found]),
+            nodes=tuple(n - 4 for n in max(shapes, key=math.prod)),
+            misfit=rms(np.array([0.0, *(patch.misfit for patch in fitted)])),
+            turn=rms(np.array([0.0, *(patch.turn for patch in fitted)])),
             noise=0.0,
             smoothing=SMOOTHING,
+            **differences(known),
         )
 
 
@@ -236,11 +220,10 @@ def fitted_pieces(
     points, owner = _spread(vertices[triangles], at_corners, piece)
     creases = tuple(_judged(crease, patches) for crease in regions.creases(vertices, piece))
     creases += _tips(vertices, triangles, piece, patches)
-    fine = piece_space([patch.fine for patch in patches], points, owner, creases)
-    coarse = fine.with_splines([patch.coarse for patch in patches])
-    lost = np.concatenate([astray(fine, patches, points, owner, size), *doubted])
+    space = piece_space([patch.fine for patch in patches], points, owner, creases)
+    lost = np.concatenate([astray(space, patches, points, owner, size), *doubted])
     untrusted = np.array([rough(patch, points[owner == k], size) for k, patch in enumerate(patches)])
-    return FittedPieces(fine, coarse, tuple(patches), piece, at_corners, creases, untrusted, points, owner, lost)
+    return FittedPieces(space, tuple(patches), piece, at_corners, creases, untrusted, points, owner, lost)
 
 
 def _judged(crease: Crease, patches: list[Patch]) -> Crease:
@@ -299,9 +282,7 @@ def _parted(
     from scipy.spatial import cKDTree
 
     corners = vertices[triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.linalg.norm(normal, axis=1)
-    normal /= np.maximum(area, 1e-300)[:, None]
+    normal, area = flat_normals(corners)
     itself = np.zeros(regions.count, dtype=bool)
     sides = regions.number[regions.turns.sides[regions.crease]]
     itself[sides[sides[:, 0] == sides[:, 1], 0]] = True
@@ -312,7 +293,7 @@ def _parted(
         folds = bool(itself[number])
         if not folds and len(own) > 1:
             reach = FOLD * SPACING * _spacing(corners[own])
-            origin, place = divided(corners[own], max(reach, 0.02 * float(np.sqrt(area[own].sum()))))
+            origin, place = divided(corners[own], max(reach, 0.02 * float(np.sqrt(2 * area[own].sum()))))
             tree = cKDTree(np.einsum("kj,kjc->kc", place.mean(axis=1), corners[own][origin]))
             pairs = own[origin][tree.query_pairs(reach, output_type="ndarray")]
             folds = bool(np.any(np.sum(normal[pairs[:, 0]] * normal[pairs[:, 1]], axis=1) < 0))
@@ -384,9 +365,9 @@ def _corner_normals(patch: Patch, corners: FloatArray) -> FloatArray:
     """Normals of a plane or quadric at corners (m, 3, 3), those of the triangles at a tip."""
     gradient = patch.fine.gradient(corners.reshape(-1, 3)).reshape(-1, 3, 3)
     slope = np.linalg.norm(gradient, axis=2, keepdims=True)
-    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
-    return np.where(slope > TIP * np.median(slope), gradient / np.maximum(slope, 1e-300), flat[:, None])
+    return np.where(
+        slope > TIP * np.median(slope), gradient / np.maximum(slope, 1e-300), flat_normals(corners)[0][:, None]
+    )
 
 
 def _patch(
@@ -411,9 +392,7 @@ def _patch(
         n = n if jets is None or normals is not None else jets.normals
         return spline_patch(x, n, float(side.mean()), jets, local), n[local[mine]]
     # known from few vertices: points between them by curved triangles
-    area = 0.5 * float(
-        np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
-    )
+    area = float(flat_normals(corners)[1].sum())
     edge = max(min(_spacing(corners), np.sqrt(area / EVEN)), np.sqrt(area / MOST_POINTS))
     origin, place = divided(corners, 1.5 * edge)
     points, between = curved(corners[origin], n[local][origin], place.mean(axis=1))
@@ -458,7 +437,7 @@ def absorbed(
     sharp = np.flatnonzero(regions.crease & ~regions.level)
     sides = regions.turns.sides[sharp]
     corners = vertices[triangles]
-    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    flat = flat_normals(corners)[0]
     count = np.bincount(number)
     for k in np.argsort(-count).tolist():
         pair = number[sides]

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from scatterers.pieces.patch import Closeness, Patch, polynomial_patch
 from scatterers.triangles.jets import angle_weighted_normals
-from scatterers.triangles.topology import components, edges_of
+from scatterers.triangles.topology import components, edges_of, flat_normals
 
 SMOOTH = 0.02
 """Angle between the normals of two quadrics, radians, up to which they may join there without an edge."""
@@ -193,10 +193,9 @@ def with_between(
     """Sheets with those through triangles at edges (e,) whose ends no sheet and no joint connects."""
     edges = edges_of(triangles)
     lost = np.flatnonzero(open_[edges.number].reshape(-1, 3).any(axis=1))
-    order = np.argsort(edges.number, kind="stable").reshape(-1, 2) // 3
     place = np.full(len(triangles), -1)
     place[lost] = np.arange(len(lost))
-    joined = place[order]
+    joined = place[edges.sides // 3]
     joined = joined[np.all(joined >= 0, axis=1)]
     label = components(len(lost), joined[:, 0], joined[:, 1])[1]
     more = []
@@ -453,8 +452,7 @@ def _labelled(
 ) -> Jointed | None:
     """Which sheet each triangle lies on, and where these meet."""
     corners = vertices[triangles]
-    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
+    flat = flat_normals(corners)[0]
     common = held[triangles].sum(axis=1)
     most = common.max(axis=1)
     lean = np.full((len(triangles), len(sheets)), -np.inf)
@@ -464,7 +462,7 @@ def _labelled(
         lean[mine, k] = np.sum(sheet.normals(corners[mine].mean(axis=1)) * flat[mine], axis=1)
     label = np.argmax(lean, axis=1)
     edges = edges_of(triangles)
-    sides = label[np.argsort(edges.number, kind="stable").reshape(-1, 2) // 3]
+    sides = label[edges.sides // 3]
     meet = np.flatnonzero(sides[:, 0] != sides[:, 1])
     middle = vertices[edges.ends[meet]].mean(axis=1)
     normals = np.zeros((2, len(meet), 3))

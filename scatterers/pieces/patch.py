@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.kernels.tensor import POWERS
-from scatterers.spline.fitting import ACCURACY, fit, spacing_of
+from scatterers.spline.fitting import ACCURACY, COARSER, fit, spacing_of
 from scatterers.spline.tensor import TensorSpline
 from scatterers.triangles.jets import Jets, centroids, signed_distance
 
@@ -49,7 +49,6 @@ ON = 1e4
 """Weight of points against normals, which those of triangles give roughly."""
 SPACING, BETWEEN, NODES = 1.8, 1.1, 4e5
 """Grid of a spline in units of the distance of points, of those with others between them, and its most nodes."""
-COARSER = 1.35
 STEPS = 300
 """Of a fit: the borders of a piece take long, and gain little."""
 CLOSELY, ROUGHLY = ACCURACY, 3e-4

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.body import Crease
-from scatterers.triangles.topology import components, edges_of
+from scatterers.triangles.topology import components, edges_of, flat_normals
 
 FLAT, TURN, SHARP, ALWAYS = 0.5, 12.0, 40.0, 60.0
 """Degrees; beyond the last an edge is sharp whatever the others are."""
@@ -116,9 +116,7 @@ def _turns(vertices: FloatArray, triangles: IntArray) -> Turns:
     edges = edges_of(triangles)
     # both corners of each edge, that of the triangle that runs forward along it first
     order = np.lexsort((~edges.forward, edges.number)).reshape(-1, 2)
-    corners = vertices[triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.linalg.norm(normal, axis=1)
+    normal, area = flat_normals(vertices[triangles])
     sides = order // 3
     left, right = normal[sides[:, 0]], normal[sides[:, 1]]
     across = np.cross(left, right)
@@ -127,7 +125,7 @@ def _turns(vertices: FloatArray, triangles: IntArray) -> Turns:
     # the left triangle runs forward along the edge: at a convex edge left x right points along it
     turn = np.where(np.sum(across * along, axis=1) >= 0, turn, -turn)
     thin = np.minimum(area[sides[:, 0]], area[sides[:, 1]]) < SLIVER * np.median(area) * (
-        np.linalg.norm(along, axis=1) / np.sqrt(np.median(area))
+        np.linalg.norm(along, axis=1) / np.sqrt(2 * np.median(area))
     ).clip(None, 1.0)
     return Turns(edges.ends, sides, np.where(thin & (np.abs(turn) < ALWAYS), 0.0, turn))
 

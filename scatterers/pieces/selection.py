@@ -15,7 +15,7 @@ Also here: which pieces make one smooth surface near a point, and the planes thr
 Sources: Derivations, B13.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scatterers.body import Crease
-from scatterers.kernels.compiled import evaluated
+from scatterers.kernels.compiled import Compiled, evaluated
 from scatterers.kernels.pieces import BESIDES, FIRST, LARGER, MOST_PIECES, SMALLER
 from scatterers.kernels.tensor import CENTRE, HEADER
 from scatterers.spline.tensor import TensorSpline
@@ -52,31 +52,26 @@ Program = tuple[float, ...]
 
 @dataclass(frozen=True, eq=False)
 class PieceSpace:
-    """F of a body of pieces, in a box of space.
+    """F of a body of pieces.
 
     Attributes
     ----------
     splines : sequence of TensorSpline
         F of each piece.
     table : (k,)
-        Header, table of voxels and programs, as `scatterers.kernels.pieces` takes them, without the splines.
-    box : (2, 3), L
+        Header, table of voxels and programs, as `scatterers.kernels.pieces` takes them, without the splines; empty for
+        one piece that is the whole body.
     """
 
     splines: Sequence[TensorSpline]
     table: FloatArray
-    box: FloatArray
 
-    @property
-    def sources(self) -> Mapping[str, Callable[..., None]]:
-        """Plain Python of the compiled level."""
+    @cached_property
+    def compiled(self) -> Compiled:
+        """Compiled level."""
         from scatterers.kernels.pieces import evaluate
 
-        return {"level": evaluate}
-
-    def flat(self, of_map: FloatArray) -> FloatArray:
-        """Parameters of the compiled level; there is no sphere map."""
-        return self.parameters
+        return Compiled(evaluate, "level", self.parameters) if len(self.table) else self.splines[0].compiled
 
     @cached_property
     def parameters(self) -> FloatArray:
@@ -92,8 +87,9 @@ class PieceSpace:
         from scatterers.kernels.pieces import numbers
 
         columns = np.ascontiguousarray(points, dtype=float).reshape(-1, 3)
-        found = np.empty(len(columns), np.int64)
-        numbers(columns, found, self.parameters)
+        found = np.zeros(len(columns), np.int64)
+        if len(self.table):
+            numbers(columns, found, self.parameters)
         return found.reshape(np.shape(points)[:-1])
 
     def check(self) -> None:
@@ -116,12 +112,8 @@ class PieceSpace:
             ends = places + 1 + table[places].clip(0, len(table)).astype(np.int64) if sound else places
             sound = sound and bool(np.all((table[places] >= 1) & (ends <= len(table))))
             sound = sound and all(_sound(table[a + 1 : b], count) for a, b in zip(places, ends, strict=True))
-        if not sound or any(min(spline.coefficients.shape) < 6 for spline in self.splines):
+        if not sound:
             raise ValueError("the table of the pieces is damaged")
-
-    def with_splines(self, splines: Sequence[TensorSpline]) -> "PieceSpace":
-        """The same choice among other splines, such as coarser fits."""
-        return PieceSpace(splines, self.table, self.box)
 
 
 def _sound(program: FloatArray, count: int) -> bool:
@@ -179,11 +171,7 @@ def piece_space(
         if key not in known:
             known[key] = _program(*key)
         programs[where] = known[key]
-    return PieceSpace(
-        splines,
-        _table(origin, side, shape, programs, _followed(occupied, shape)),
-        np.stack([origin, origin + shape * side]),
-    )
+    return PieceSpace(splines, _table(origin, side, shape, programs, _followed(occupied, shape)))
 
 
 def _followed(occupied: IntArray, shape: IntArray) -> IntArray:

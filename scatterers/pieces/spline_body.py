@@ -1,7 +1,7 @@
 """A body of fitted pieces: its level, what creeping asks of creases, and the arrays that it is stored as."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, cast
 
@@ -18,6 +18,8 @@ from scatterers.spline.tensor import TensorSpline
 KINDS = ("edge", "joint", "tip", "seam")
 TRUSTED = 1.0
 """Distance from an edge from which on a fitted piece is trusted, in distances of its points."""
+LEAST = 6
+"""Coefficients along an axis of a spline of degree 5."""
 STEPS, MOVED = 3, 0.1
 """Newton steps that bring tiles onto their piece, and the longest, in their sides."""
 
@@ -29,37 +31,51 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class SplinePieces:
-    """The pieces of a body of one fit.
+    """The pieces of a body of one fit; a smooth body is one piece without creases.
 
     Attributes
     ----------
     space : PieceSpace
+    astray : (j, 3), L
+        Points about which the level is not trusted,
+    within : float
+        to this distance, L.
     creases : tuple of Crease
     corners, normals : (m, 3, 3), L and 1
-        Triangles of the mesh, outward normals of their pieces.
+        Triangles of the mesh, outward normals of their pieces; none of a smooth body.
     number : (m,)
         Piece of each triangle.
     reach : (p,), L
         Distance from its edges within which a piece is not trusted, inf for one that is not trusted at all.
-    astray : (j, 3), L
-        Points about which the level is not trusted, within a voxel.
     """
 
     space: PieceSpace
+    astray: FloatArray
+    within: float
     creases: tuple[Crease, ...]
     corners: FloatArray
     normals: FloatArray
     number: IntArray
     reach: FloatArray
-    astray: FloatArray
 
     @classmethod
-    def of(cls, fitted: FittedPieces, corners: FloatArray, *, coarse: bool = False) -> "SplinePieces":
-        """Those of a fit, or of its coarser twin."""
-        space = fitted.coarse if coarse else fitted.fine
+    def whole(cls, spline: TensorSpline, astray: FloatArray, within: float) -> "SplinePieces":
+        """A smooth body."""
+        none = np.zeros((0, 3, 3))
+        space = PieceSpace([spline], np.zeros(0))
+        return cls(space, astray, within, (), none, none, np.zeros(0, np.int64), np.zeros(1))
+
+    @classmethod
+    def of(cls, fitted: FittedPieces, corners: FloatArray) -> "SplinePieces":
+        """Those of a fit."""
         reach = np.array([TRUSTED * patch.spacing for patch in fitted.patches])
         reach = np.where(fitted.rough, np.inf, reach)
-        return cls(space, fitted.creases, corners, fitted.normals, fitted.piece, reach, fitted.astray)
+        within = 1 / fitted.space.table[3]
+        return cls(fitted.space, fitted.astray, within, fitted.creases, corners, fitted.normals, fitted.piece, reach)
+
+    def with_splines(self, splines: Sequence[TensorSpline]) -> "SplinePieces":
+        """The same body by other splines, such as coarser fits."""
+        return replace(self, space=PieceSpace(splines, self.space.table))
 
     @cached_property
     def surfaces(self) -> tuple[Piece, ...]:
@@ -104,7 +120,7 @@ class SplinePieces:
         """Tree of points on edges of fitted pieces, and how far from each the pieces are not trusted."""
         from scipy.spatial import cKDTree
 
-        points, reach = [self.astray], [np.full(len(self.astray), 1 / self.space.table[3])]
+        points, reach = [self.astray], [np.full(len(self.astray), self.within)]
         for crease in self.creases:
             sides = self.reach[list(crease.pieces)]
             own = float(np.max(np.where(np.isfinite(sides), sides, 0.0)))
@@ -114,29 +130,25 @@ class SplinePieces:
                 reach.append(np.full(len(dense), own))
         return cKDTree(np.concatenate(points)), np.concatenate(reach)
 
-    def arrays(self, name: str) -> dict[str, FloatArray]:
-        """All that `restored` needs, under names that begin with ``name``."""
+    def arrays(self) -> dict[str, FloatArray]:
+        """All that `restored` needs, but for the splines."""
         lengths = [len(crease.points) for crease in self.creases]
         sides = [(KINDS.index(c.kind), *c.pieces, c.angle, n) for c, n in zip(self.creases, lengths, strict=True)]
-        found = {
+        return {
             "table": self.space.table,
-            "box": self.space.box,
+            "astray": self.astray,
+            "within": np.array([self.within]),
             "corners": self.corners,
             "normals": self.normals,
             "number": self.number.astype(float),
             "reach": self.reach,
-            "astray": self.astray,
             "creases": np.array(sides, dtype=float).reshape(-1, 5),
             "crease-points": np.concatenate([np.zeros((0, 3)), *(crease.points for crease in self.creases)]),
         }
-        for k, spline in enumerate(self.space.splines):
-            found[f"coefficients-{k}"] = spline.coefficients
-            found[f"grid-{k}"] = np.stack([spline.origin, spline.spacing])
-        return {f"{name}-{key}": array for key, array in found.items()}
 
     @classmethod
-    def restored(cls, arrays: Mapping[str, FloatArray], name: str) -> "SplinePieces":
-        """The pieces whose `arrays` these are.
+    def restored(cls, arrays: Mapping[str, FloatArray], splines: Sequence[TensorSpline]) -> "SplinePieces":
+        """The pieces whose `arrays` and splines these are.
 
         Raises
         ------
@@ -145,29 +157,52 @@ class SplinePieces:
         """
 
         def get(key: str) -> FloatArray:
-            return np.ascontiguousarray(arrays[f"{name}-{key}"], dtype=float)
+            return np.ascontiguousarray(arrays[key], dtype=float)
 
-        reach = get("reach")
-        splines = []
-        for k in range(len(reach)):
-            origin, spacing = get(f"grid-{k}")
-            splines.append(TensorSpline(get(f"coefficients-{k}"), origin, spacing))
-        creases, points, begin = [], get("crease-points"), 0
+        reach, number = get("reach"), cast(IntArray, get("number").astype(np.int64))
+        corners, normals, points, begin = get("corners"), get("normals"), get("crease-points"), 0
+        creases = []
         for kind, first, second, angle, count in get("creases").tolist():
             curve = points[begin : begin + int(count)]
             begin += int(count)
             creases.append(Crease(KINDS[int(kind)], (int(first), int(second)), curve, angle))
-        space = PieceSpace(tuple(splines), get("table"), get("box"))
-        number = cast(IntArray, get("number").astype(np.int64))
-        corners, normals = get("corners"), get("normals")
-        space.check()
-        if corners.shape != (len(number), 3, 3) or normals.shape != corners.shape or begin != len(points):
+        space = PieceSpace(tuple(splines), get("table"))
+        if len(space.table) or len(splines) != 1:
+            space.check()
+        if len(reach) != len(splines) or corners.shape != (len(number), 3, 3) or normals.shape != corners.shape:
             raise ValueError("the triangles of the pieces are damaged")
         if not np.all((number >= 0) & (number < len(reach))) or not np.all(np.isfinite(corners)):
             raise ValueError("the triangles of the pieces are damaged")
-        if not all(0 <= side < len(reach) for crease in creases for side in crease.pieces):
+        if begin != len(points) or not all(0 <= side < len(reach) for crease in creases for side in crease.pieces):
             raise ValueError("the creases of the pieces are damaged")
-        return cls(space, tuple(creases), corners, normals, number, reach, get("astray").reshape(-1, 3))
+        astray, within = get("astray").reshape(-1, 3), float(get("within")[0])
+        return cls(space, astray, within, tuple(creases), corners, normals, number, reach)
+
+
+def packed(splines: Sequence[TensorSpline], name: str) -> dict[str, FloatArray]:
+    """Splines as arrays, under names that begin with ``name``."""
+    parts = [(spline.coefficients, np.stack([spline.origin, spline.spacing])) for spline in splines]
+    found = {f"{name}-coefficients-{k}": coefficients for k, (coefficients, _) in enumerate(parts)}
+    return found | {f"{name}-grid-{k}": grid for k, (_, grid) in enumerate(parts)}
+
+
+def unpacked(arrays: Mapping[str, FloatArray], name: str) -> tuple[TensorSpline, ...]:
+    """The splines again.
+
+    Raises
+    ------
+    ValueError, KeyError
+        If an array is missing, or is not of the form that kernels trust.
+    """
+    splines = []
+    for k in range(len(arrays["reach"])):
+        grid, coefficients = arrays[f"{name}-grid-{k}"], arrays[f"{name}-coefficients-{k}"]
+        sound = grid.shape == (2, 3) and coefficients.ndim == 3 and min(coefficients.shape) >= LEAST
+        sound = sound and grid.dtype == coefficients.dtype == float and bool(np.all(np.isfinite(grid)))
+        if not sound or np.any(grid[1] <= 0) or not np.all(np.isfinite(coefficients)):
+            raise ValueError(f"spline {k} of the {name} fit is damaged")
+        splines.append(TensorSpline(np.ascontiguousarray(coefficients), *grid))
+    return tuple(splines)
 
 
 def _dense(points: FloatArray, apart: float) -> FloatArray:

@@ -16,24 +16,14 @@ from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
-from numpy.typing import NDArray
 
+from creeping._typing import FloatArray
 from creeping.kernels.private_cache import private_folder, require_private
 
-SCHEMA = 14
+SCHEMA = 15
 """Counts up with every change of what is stored or of how it is fitted."""
 DIGEST = 32
 NAME = re.compile(r"[a-z]+-[0-9a-f]{24}\.npz")
-ARRAYS = {
-    **{"rough": 2, "badness": 1},
-    **{"fine-coefficients": 3, "fine-grid": 2, "coarse-coefficients": 3, "coarse-grid": 2},
-}
-"""Arrays of a fit and their numbers of axes."""
-LEAST = 6
-"""Coefficients along an axis of a spline of degree 5."""
-
-
-FloatArray = NDArray[np.float64]
 
 
 def cache_folder() -> Path:
@@ -64,26 +54,9 @@ def load(folder: Path, key: str) -> tuple[dict[str, FloatArray], dict[str, Any]]
         with np.load(io.BytesIO(whole[DIGEST:]), allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
         text = json.loads(arrays.pop("text").tobytes())
-        if not ({"fit", "reach", "quality", "repairs"} <= text.keys() and _usable(arrays)):
-            return None
     except (OSError, ValueError, KeyError, AttributeError, EOFError, BadZipFile, zlib.error):
         return None
     return arrays, text
-
-
-def _usable(arrays: dict[str, FloatArray]) -> bool:
-    """Whether all arrays are there and of the shape that kernels trust; those of pieces are checked when taken."""
-    if "fine-table" in arrays:
-        return all(array.dtype == float for array in arrays.values()) and {"rough", "badness"} <= arrays.keys()
-    if not all(arrays[name].dtype == float and arrays[name].ndim == count for name, count in ARRAYS.items()):
-        return False
-    for name in ("fine", "coarse"):
-        grid, coefficients = arrays[f"{name}-grid"], arrays[f"{name}-coefficients"]
-        if grid.shape != (2, 3) or not np.all(np.isfinite(grid)) or np.any(grid[1] <= 0):
-            return False
-        if min(coefficients.shape) < LEAST or not np.all(np.isfinite(coefficients)):
-            return False
-    return arrays["rough"].shape[1:] == (3,)
 
 
 def store(folder: Path, key: str, arrays: dict[str, FloatArray], text: dict[str, Any]) -> str:

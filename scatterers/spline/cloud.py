@@ -13,7 +13,7 @@ Also here: what a spline makes of points of its body: two fits of one body diffe
 Sources: Derivations, B8.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -262,6 +262,24 @@ class FitReport:
         )
 
 
+def differences(fits: Sequence[tuple[TensorSpline, TensorSpline, FloatArray, FloatArray]]) -> dict[str, Any]:
+    """What a `FitReport` says of curvatures and |grad F|, by two fits, points (n, 3), L, and normals of each F."""
+    found = []
+    for fine, coarse, points, normals in fits:
+        along = tangents(normals)[0]
+        (kappa, gauss, slope), (other, other_gauss, _) = (curvatures(one, points, along) for one in (fine, coarse))
+        found.append((kappa, kappa - other, gauss, gauss - other_gauss, slope))
+    every = [np.concatenate(parts) for parts in zip(*found, strict=True)] or [np.zeros(1)] * 4 + [np.ones(1)]
+    names = ("normal_curvature", "normal_curvature_error", "gaussian_curvature", "gaussian_curvature_error")
+    measured: dict[str, Any] = {name: rms(values) for name, values in zip(names, every[:4], strict=True)}
+    return measured | {"slope": (float(every[4].min()), float(every[4].max()))}
+
+
+def rms(values: FloatArray) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(values**2)))
+
+
 def curvatures(
     spline: TensorSpline, points: FloatArray, along: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -302,7 +320,7 @@ def left_at(spline: TensorSpline, points: FloatArray, normals: FloatArray | None
     value, gradient, _ = evaluated(spline.compiled, points)
     slope = np.linalg.norm(gradient, axis=1)
     turn = 0.0 if normals is None else np.linalg.norm(gradient / slope[:, None] - normals, axis=1)
-    return float(np.sqrt(np.mean((value / slope) ** 2))), float(np.sqrt(np.mean(turn**2)))
+    return rms(value / slope), rms(np.asarray(turn))
 
 
 def tangents(normals: FloatArray) -> FloatArray:

@@ -52,6 +52,8 @@ NEAR = 7.0
 AWAY = 1.2
 """Cells from the points within which parts of either sign come that the body bounds."""
 QUASI = np.array([13, -112, 438, -112, 13]) / 240
+COARSER = 1.35
+"""Spacing of the grid of a second fit, in units of the first."""
 MAX_NODES = 8_000_000
 ITERATIONS = 480
 CHECKED = 20

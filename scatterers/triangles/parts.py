@@ -20,7 +20,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from scatterers.triangles.topology import Edges, components, edges_of, oriented
+from scatterers.triangles.topology import Edges, components, edges_of, flat_normals, oriented, umbrellas
 
 LISTED = 8
 """Parts that an error lists."""
@@ -223,8 +223,7 @@ def united(
 
 def areas(vertices: FloatArray, triangles: IntArray) -> FloatArray:
     """Areas (m,) of triangles."""
-    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
-    return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
+    return flat_normals(vertices[triangles])[1]
 
 
 def taken_apart(name: str, vertices: FloatArray, triangles: IntArray, note: Note) -> tuple[FloatArray, IntArray]:
@@ -245,14 +244,9 @@ def taken_apart(name: str, vertices: FloatArray, triangles: IntArray, note: Note
     if len(shared) > MOST_SHARED:
         return vertices, triangles
     left, right, parted = _joined(vertices, triangles, edges, shared)
-    # a corner is followed by its edge: the ends of that of both triangles are the same places
-    after = _next(left), _next(right)
-    same = edges.forward[left] == edges.forward[right]
-    starts = np.concatenate([left, after[0]])
-    ends = np.concatenate([np.where(same, right, after[1]), np.where(same, after[1], right)])
-    umbrellas, label = components(triangles.size, starts, ends)
+    count, label = umbrellas(edges, left, right)
     used = np.unique(triangles)
-    if umbrellas <= len(used):
+    if count <= len(used):
         return vertices, triangles
     _, first = np.unique(label, return_index=True)
     old = triangles.ravel()[first]
@@ -322,7 +316,3 @@ def _pairs(angle: FloatArray, forward: NDArray[np.bool_], sheet: IntArray) -> In
     flat = [(abs(abs(angle[i] - angle[j]) - np.pi), i, j) for i in left for j in left if forward[i] > forward[j]]
     take([(i, j) for _, i, j in sorted(flat)])
     return np.array(found, dtype=np.int64).reshape(-1, 2)
-
-
-def _next(corner: IntArray) -> IntArray:
-    return corner - corner % 3 + (corner + 1) % 3

@@ -24,7 +24,7 @@ Sources: Derivations, B5.
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,20 +56,6 @@ FEWEST_RIMS, JUMPS_ALONG = 6, 0.5
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Verdict = Literal["smooth", "noisy", "sharp", "curvature jumps", "too coarse"]
-
-
-class Mesh(Protocol):
-    """What `assess` asks of a mesh."""
-
-    @property
-    def vertices(self) -> FloatArray:
-        """Vertices (n, 3), m."""
-        ...
-
-    @property
-    def triangles(self) -> IntArray:
-        """Vertex numbers (m, 3)."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,9 +167,8 @@ def _metres(size: FloatArray) -> str:
     return " x ".join(f"{v:.4g}" for v in size) + " m"
 
 
-def assess(mesh: Mesh, jets: Jets) -> MeshQuality:
-    """Judge a closed, oriented mesh by its jets."""
-    vertices, triangles = mesh.vertices, mesh.triangles
+def assess(vertices: FloatArray, triangles: IntArray, jets: Jets) -> MeshQuality:
+    """Judge a closed, oriented mesh (n, 3), m, and (m, 3) by its jets."""
     corners = vertices[triangles]
     length = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=-1)
     edge = float(length.mean())

@@ -53,6 +53,18 @@ class Edges(NamedTuple):
     number: IntArray
     forward: NDArray[np.bool_]
 
+    @property
+    def sides(self) -> IntArray:
+        """Corners (e, 2) of a closed mesh that the edges follow, in the triangles on both sides."""
+        return np.argsort(self.number, kind="stable").reshape(-1, 2)
+
+
+def flat_normals(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Unit normals (m, 3) and areas (m,) of triangles (m, 3, 3); 0 where they have none."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    twice = np.linalg.norm(normal, axis=1)
+    return normal / np.maximum(twice, 1e-300)[:, None], 0.5 * twice
+
 
 def edges_of(triangles: IntArray) -> Edges:
     """Number the edges."""
@@ -157,7 +169,7 @@ def oriented(name: str, vertices: FloatArray, triangles: IntArray, note: Note) -
     edges = edges_of(triangles)
     _check_edges(name, vertices, edges)
     # the corners of both triangles at each edge, next to each other
-    order = np.argsort(edges.number, kind="stable").reshape(-1, 2)
+    order = edges.sides
     _check_pieces(name, vertices, triangles, order, edges)
     agree = edges.forward[order[:, 0]] != edges.forward[order[:, 1]]
     if not agree.all():
@@ -209,13 +221,8 @@ def _check_pieces(name: str, vertices: FloatArray, triangles: IntArray, order: I
             f"{name} holds {pieces} separate surfaces{hint}, of {', '.join(map(str, counts[:5]))} "
             f"{'... ' if pieces > 5 else ''}triangles; take one, e.g. part='largest', or all with union=True"
         )
-    # corners of one vertex that are joined through edges: the umbrellas
-    after = _next(left), _next(right)
-    same = edges.forward[left] == edges.forward[right]
-    starts = np.concatenate([left, after[0]])
-    ends = np.concatenate([np.where(same, right, after[1]), np.where(same, after[1], right)])
-    umbrellas, label = components(3 * len(triangles), starts, ends)
-    if umbrellas > len(vertices):
+    count, label = umbrellas(edges, left, right)
+    if count > len(vertices):
         _, corner = np.unique(label, return_index=True)
         shared = np.bincount(triangles.ravel()[corner], minlength=len(vertices)) > 1
         place = np.round(vertices[shared][0], 6).tolist()
@@ -225,7 +232,19 @@ def _check_pieces(name: str, vertices: FloatArray, triangles: IntArray, order: I
         )
 
 
-def _next(corner: IntArray) -> IntArray:
+def umbrellas(edges: Edges, left: IntArray, right: IntArray) -> tuple[int, IntArray]:
+    """How many groups there are of corners of one vertex joined through edges, and that of each corner (3 m,).
+
+    ``left`` and ``right`` (k,) are corners whose edges are joined: the ends of both are the same places.
+    """
+    after = next_corner(left), next_corner(right)
+    same = edges.forward[left] == edges.forward[right]
+    ends = np.concatenate([np.where(same, right, after[1]), np.where(same, after[1], right)])
+    return components(len(edges.number), np.concatenate([left, after[0]]), ends)
+
+
+def next_corner(corner: IntArray) -> IntArray:
+    """Corner (k,) of the flat triangles that follows in the same triangle."""
     return corner - corner % 3 + (corner + 1) % 3
 
 

@@ -205,9 +205,9 @@ DAMAGE = {
     "cut short": lambda b: b[: len(b) // 2],
     "signed, cut short": lambda b: signed(b[32 : len(b) // 2]),
     "report of another kind": lambda b: signed(repacked(b[32:], text=np.frombuffer(b'{"fit": 3}', dtype=np.uint8))),
-    "few coefficients": lambda b: signed(repacked(b[32:], **{"coarse-coefficients": np.zeros((2, 2, 2))})),
-    "NaN": lambda b: signed(repacked(b[32:], **{"fine-coefficients": np.full((9, 9, 9), np.nan)})),
-    "grid of no size": lambda b: signed(repacked(b[32:], **{"fine-grid": np.zeros((2, 3))})),
+    "few coefficients": lambda b: signed(repacked(b[32:], **{"coarse-coefficients-0": np.zeros((2, 2, 2))})),
+    "NaN": lambda b: signed(repacked(b[32:], **{"fine-coefficients-0": np.full((9, 9, 9), np.nan)})),
+    "grid of no size": lambda b: signed(repacked(b[32:], **{"fine-grid-0": np.zeros((2, 3))})),
 }
 
 

@@ -129,7 +129,7 @@ def test_smooth_bodies_have_no_joints(name, noise, count):
     rng = np.random.default_rng(11)
     points = points + noise * 0.5 * np.linalg.norm(np.ptp(points, axis=0)) * rng.normal(size=points.shape)
     jets = osculating_jets(points, triangles)
-    quality = assess(SimpleNamespace(vertices=points, triangles=triangles), jets)
+    quality = assess(points, triangles, jets)
     clean = jets.fitted & ~quality.bad & ~jumps_at(jets, quality.edge_mean)
     assert jointed(points, triangles, jets.normals, clean) is None
     # nor within all that jets leave, taken for noise
