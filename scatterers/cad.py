@@ -1,4 +1,4 @@
-"""Body from a CAD file: points and exact normals of its faces by gmsh, and the fit of `scatterers.base.fitted_body`.
+"""Body from a CAD file: points and exact normals of its faces by gmsh, and the fit of `scatterers.fits.fitted_body`.
 
 gmsh is an optional library under the GPL: ``pip install 'creeping[cad]'``.
 """
@@ -10,15 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scatterers.base.fitted_body import FittedBody, checked_options
-from scatterers.base.quadrics import PieceCloud, PointCloud
-from scatterers.cad_file.files import CadPoints, CadReading, kind_of, read_cad
-from scatterers.pieces.regions import regions_of
-from scatterers.spline.cache import key_of
+from scatterers.fits.cache import key_of
+from scatterers.fits.cloud import PieceCloud, PointCloud
+from scatterers.fits.fitted_body import FittedBody, checked_options
+from scatterers.triangles.cad_file import CadPoints, CadReading, kind_of, read_cad
 from scatterers.triangles.jets import osculating_jets, signed_distance
 from scatterers.triangles.quality import Choice, MeshQuality, assess
+from scatterers.triangles.regions import regions_of
 from scatterers.triangles.topology import edges_of
 
 POINTS = 10_000
@@ -27,9 +26,6 @@ CURVED = 30
 """Triangles to a full turn of a curved face of a body with edges."""
 SPACING = 2.0
 """Spacing of the grid in units of the mean distance of neighbouring points."""
-
-
-FloatArray = NDArray[np.float64]
 
 
 class Cad(FittedBody):

@@ -17,9 +17,9 @@ import numpy as np
 from creeping._typing import FloatArray
 from scatterers.body import Body, Levelled, SphereMapped, finite, polar_angles, positive
 from scatterers.cached import cached
+from scatterers.charts.star import CubeSphereAtlas, FaceChart
 from scatterers.kernels.compiled import Compiled, Kind
-from scatterers.kernels.trigonometry import cos_pi, cube_tangents, fill_frame, sin_pi
-from scatterers.sphere_map.star import CubeSphereAtlas, FaceChart
+from scatterers.kernels.sphere_maps import cos_pi, cube_tangents, fill_frame, sin_pi
 
 
 class BentEllipsoid(Levelled, SphereMapped, Body):

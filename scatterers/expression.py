@@ -156,8 +156,8 @@ class Differentiated(NamedTuple):
 
     Attributes
     ----------
-    value, gradient, hessian : callable
-        numpy functions of x, y, z that return 1, 3 and 6 (xx, yy, zz, yz, xz, xy) arrays.
+    value : callable
+        numpy function of x, y, z that returns a list of one array.
     block : callable
         Plain Python of the block evaluator; see `scatterers.kernels.compiled.Compiled`.
     first : callable
@@ -165,8 +165,6 @@ class Differentiated(NamedTuple):
     """
 
     value: Callable[..., Any]
-    gradient: Callable[..., Any]
-    hessian: Callable[..., Any]
     block: Callable[..., None]
     first: Callable[..., tuple[float, float, float, float]]
 
@@ -302,7 +300,7 @@ def shown(what: Any) -> str:
 
 
 def differentiate(text: str) -> Differentiated:
-    """Parse the text and make numpy functions and a block evaluator of its value, gradient and Hessian.
+    """Parse the text and make a numpy function of its value, and a block evaluator with gradient and Hessian.
 
     Raises
     ------
@@ -394,12 +392,8 @@ def derivatives(expression: Any, text: str) -> Differentiated:
     exec(compile("\n".join(lines), "<expression>", "exec"), space)  # printed by sympy, see the module's head
     space["block"].operations = operations
 
-    def numeric(parts: list[Any]) -> Callable[..., Any]:
-        known = [NUMERIC, "numpy"]
-        function: Callable[..., Any] = sympy.lambdify((x, y, z), parts, known, cse=_shared)
-        return function
-
-    return Differentiated(numeric([expression]), numeric(gradient), numeric(hessian), space["block"], space["first"])
+    value = sympy.lambdify((x, y, z), [expression], [NUMERIC, "numpy"], cse=_shared)
+    return Differentiated(value, space["block"], space["first"])
 
 
 def _size(expression: Any) -> int:

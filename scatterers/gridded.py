@@ -11,20 +11,17 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from scatterers.base.level_body import LevelBody
+from creeping._typing import ArrayLike, FloatArray
 from scatterers.body import box_of, numbers, numbers_of
-from scatterers.sphere_map.star import star_map
-from scatterers.spline.cloud import Samples
-from scatterers.spline.tensor import TensorSpline, coefficients
+from scatterers.charts.level_body import LevelBody
+from scatterers.charts.samples import Samples
+from scatterers.charts.star import star_map
+from scatterers.fits.tensor import TensorSpline, coefficients
 
 MOST = 1000
 """Nodes along an axis of a body that is sampled."""
 FEWEST = 8
-
-
-FloatArray = NDArray[np.float64]
 
 
 class Gridded(LevelBody):

@@ -11,11 +11,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from scatterers.base.level_body import LevelBody
+from creeping._typing import ArrayLike, FloatArray, IntArray
 from scatterers.body import SHARP, Crease, Piece, box_of, no_charts, numbers_of, positive
 from scatterers.cached import cached
+from scatterers.charts.level_body import LevelBody
+from scatterers.charts.samples import Samples
+from scatterers.charts.star import star_map
 from scatterers.exact.clipped import clip, creases, march, normals
 from scatterers.exact.singularities import (
     FINE,
@@ -34,16 +36,10 @@ from scatterers.exact.singularities import (
 )
 from scatterers.exact.switches import ExpressionSpace, Switches
 from scatterers.expression import one_sided
-from scatterers.sphere_map.star import star_map
-from scatterers.spline.cloud import Samples
 
 MOST_TIPS = 8
 PER_EDGE = 1.5
 """Cells of the grid to an edge of tiles: sides are 1.15 edges at most."""
-
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 class Implicit(LevelBody):

@@ -15,9 +15,9 @@ import numpy as np
 from creeping._typing import FloatArray
 from scatterers.body import Body, Levelled, positive
 from scatterers.cached import cached
+from scatterers.charts.star import PeriodicAtlas, PeriodicChart
 from scatterers.kernels.compiled import Compiled
-from scatterers.kernels.trigonometry import cos_pi, sin_pi, turns
-from scatterers.sphere_map.star import PeriodicAtlas, PeriodicChart
+from scatterers.kernels.sphere_maps import cos_pi, sin_pi, turns
 
 
 @dataclass(frozen=True)

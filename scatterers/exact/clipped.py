@@ -16,14 +16,16 @@ Sources: [C76, sec. 2-2].
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import permutations
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from creeping._typing import FloatArray, IntArray
 from scatterers.body import Crease, Levelled
+from scatterers.charts.samples import towards
+from scatterers.triangles.regions import curves
+from scatterers.triangles.topology import cut, edges_of
 
 NEWTON = 20
 HALVINGS = 45
@@ -47,32 +49,24 @@ STEPS = np.array(
 )
 
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class Clipped:
-    """Triangles each on one piece, and the cuts between them.
+class Clipped(NamedTuple):
+    """A closed mesh whose triangles lie on one piece each.
 
     Attributes
     ----------
-    corners : (m, 3, 3), L
+    vertices, triangles : (n, 3), L, and (m, 3)
         Counter-clockwise from outside.
     pieces : (m,)
-    cuts : (k, 2, 3), L
-        Segments of creases.
-    nodes : (k, 2)
-        Numbers of their ends: the same where cuts meet.
-    sides : (k, 2)
-        Pieces on either side, in order.
     """
 
-    corners: FloatArray
+    vertices: FloatArray
+    triangles: IntArray
     pieces: IntArray
-    cuts: FloatArray
-    nodes: IntArray
-    sides: IntArray
+
+    @property
+    def corners(self) -> FloatArray:
+        """Corners (m, 3, 3), L."""
+        return self.vertices[self.triangles]
 
 
 def clip(
@@ -83,48 +77,22 @@ def clip(
     triangles: IntArray,
 ) -> Clipped:
     """Triangles (m, 3) with corners among points (n, 3), L, on the body, cut where the number of the piece changes."""
-    of_point = numbers(points)
-    kinds = of_point[triangles]
-    sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1), axis=-1)
-    mixed = np.any(kinds != kinds[:, :1], axis=1)
-    pairs, which = np.unique(sides[mixed].reshape(-1, 2), axis=0, return_inverse=True)
-    # of the sides between two pieces; the others stay unused
-    between = _on_both(body, pieces, numbers, *(points[end] for end in pairs.T), *(of_point[end] for end in pairs.T))
-    which = which.reshape(-1, 3)
-    x, k = points[triangles[mixed]], kinds[mixed]
-    cut = between[which]
-    corners, numbered = [points[triangles[~mixed]]], [kinds[~mixed, 0]]
-    cuts, nodes, apart = [], [], []
-    for odd in range(3):
-        i, j, h = odd, (odd + 1) % 3, (odd + 2) % 3
-        two = (k[:, j] == k[:, h]) & (k[:, i] != k[:, j])
-        # cuts of the sides i-j and h-i
-        after, before = cut[two, i], cut[two, h]
-        corners += [
-            np.stack([x[two, i], after, before], axis=1),
-            np.stack([after, x[two, j], x[two, h]], axis=1),
-            np.stack([after, x[two, h], before], axis=1),
-        ]
-        numbered += [k[two, i], k[two, j], k[two, j]]
-        cuts.append(np.stack([after, before], axis=1))
-        nodes.append(np.stack([which[two, i], which[two, h]], axis=-1))
-        apart.append(np.stack([k[two, i], k[two, j]], axis=-1))
-    three = np.flatnonzero((k[:, 0] != k[:, 1]) & (k[:, 1] != k[:, 2]) & (k[:, 2] != k[:, 0]))
-    middle = _on_all(pieces, x[three].mean(axis=1), k[three])
-    for i in range(3):
-        after, before = cut[three, i], cut[three, (i + 2) % 3]
-        corners += [np.stack([x[three, i], after, middle], axis=1), np.stack([x[three, i], middle, before], axis=1)]
-        numbered += [k[three, i], k[three, i]]
-        cuts.append(np.stack([after, middle], axis=1))
-        nodes.append(np.stack([which[three, i], len(pairs) + three], axis=-1))
-        apart.append(np.stack([k[three, i], k[three, (i + 1) % 3]], axis=-1))
-    return Clipped(
-        np.concatenate(corners),
-        np.concatenate(numbered),
-        np.concatenate(cuts),
-        np.concatenate(nodes).astype(np.int64),
-        np.sort(np.concatenate(apart), axis=-1).astype(np.int64),
-    )
+    kind = numbers(points)
+    a, b, c = triangles.T
+    three = (kind[a] != kind[b]) & (kind[b] != kind[c]) & (kind[c] != kind[a])
+    middle = _on_all(pieces, points[triangles[three]].mean(axis=1), kind[triangles[three]])
+    new = len(points) + np.arange(len(middle))
+    fans = [np.stack([start[three], end[three], new], axis=1) for start, end in ((a, b), (b, c), (c, a))]
+    points, triangles = np.concatenate([points, middle]), np.concatenate([triangles[~three], *fans])
+    # what is on several has no number
+    kind = np.concatenate([kind, np.full(len(middle), -1)])
+    start, end = edges_of(triangles).ends.T
+    at = np.flatnonzero((kind[start] != kind[end]) & (kind[start] >= 0) & (kind[end] >= 0))
+    start, end = start[at], end[at]
+    between = _on_both(body, pieces, numbers, points[start], points[end], kind[start], kind[end])
+    vertices, triangles = cut(points, triangles, at, between)
+    kind = np.concatenate([kind, np.full(len(at), -1)])
+    return Clipped(vertices, triangles, kind[triangles].max(axis=1))
 
 
 def _on_both(
@@ -147,18 +115,11 @@ def _on_both(
     halved = (~steep | far) & (ka != kb)
     low, high, first = a[halved], b[halved], ka[halved]
     for _ in range(HALVINGS):
-        at = 0.5 * (low + high)
-        for _ in range(3):
-            at = at - _step(body.level(at), body.gradient(at))
+        at = towards(body.compiled, 0.5 * (low + high), 3)
         same = (numbers(at) == first)[:, None]
         low, high = np.where(same, at, low), np.where(same, high, at)
     found[halved] = 0.5 * (low + high)
     return found
-
-
-def _step(value: FloatArray, gradient: FloatArray) -> FloatArray:
-    with np.errstate(all="ignore"):
-        return np.asarray(np.nan_to_num((value / np.sum(gradient**2, axis=-1))[..., None] * gradient))
 
 
 def _on_all(pieces: Sequence[Levelled], points: FloatArray, which: IntArray) -> FloatArray:
@@ -194,21 +155,23 @@ def creases(pieces: Sequence[Levelled], clipped: Clipped, spacing: float) -> lis
 
     What is shorter than the spacing is not resolved: several pieces that meet in a point seem to have curves there.
     """
+    edges = edges_of(clipped.triangles)
+    sides = clipped.pieces[edges.sides // 3]
+    between = sides[:, 0] != sides[:, 1]
     found = []
-    for a, b in np.unique(clipped.sides, axis=0).tolist():
-        mine = np.all(clipped.sides == (a, b), axis=1)
-        for points in _chains(clipped.cuts[mine], clipped.nodes[mine], THIN * spacing):
-            if np.sum(np.linalg.norm(np.diff(points, axis=0), axis=1)) < spacing:
-                continue
-            na, nb = (_normals(pieces, points, np.full(len(points), k)) for k in (a, b))
-            turn = np.arctan2(np.linalg.norm(np.cross(na, nb), axis=-1), np.sum(na * nb, axis=-1))
-            angle = float(np.nanmax(turn))
-            kind: Literal["edge", "joint", "seam"] = "edge" if angle > EDGE else "joint"
-            # where pieces that touch end on a third one, their end is not known as well as the rest
-            within = points[1:-1] if len(points) > 2 else points
-            if kind == "joint" and not _bent(pieces[a], pieces[b], within):
-                kind = "seam"
-            found.append(Crease(kind, (a, b), points, angle if kind == "edge" else 0.0))
+    for (a, b), chain, _ in curves(edges.ends[between], sides[between], len(clipped.vertices)):
+        points = _thinned(clipped.vertices[chain], THIN * spacing)
+        if np.sum(np.linalg.norm(np.diff(points, axis=0), axis=1)) < spacing:
+            continue
+        na, nb = (_normals(pieces, points, np.full(len(points), k)) for k in (a, b))
+        turn = np.arctan2(np.linalg.norm(np.cross(na, nb), axis=-1), np.sum(na * nb, axis=-1))
+        angle = float(np.nanmax(turn))
+        kind: Literal["edge", "joint", "seam"] = "edge" if angle > EDGE else "joint"
+        # where pieces that touch end on a third one, their end is not known as well as the rest
+        within = points[1:-1] if len(points) > 2 else points
+        if kind == "joint" and not _bent(pieces[a], pieces[b], within):
+            kind = "seam"
+        found.append(Crease(kind, (a, b), points, angle if kind == "edge" else 0.0))
     return found
 
 
@@ -225,29 +188,13 @@ def _bent(one: Levelled, other: Levelled, points: FloatArray) -> bool:
     return bool(np.max(np.abs(of_each[0] - of_each[1])) > JUMP * largest)
 
 
-def _chains(cuts: FloatArray, nodes: IntArray, apart: float) -> list[FloatArray]:
-    """Curves (n, 3), L, of segments that share their ends, points ``apart``, L; closed ones end where they begin."""
-    places: dict[int, FloatArray] = {}
-    near: dict[int, list[int]] = {}
-    for (p, q), (a, b) in zip(cuts, nodes.tolist(), strict=True):
-        places[a], places[b] = p, q
-        near.setdefault(a, []).append(b)
-        near.setdefault(b, []).append(a)
-    found = []
-    # open curves from their ends first
-    for start in sorted(near, key=lambda node: len(near[node]) == 2):
-        while near[start]:
-            chain = [start]
-            while near[chain[-1]]:
-                following = near[chain[-1]].pop()
-                near[following].remove(chain[-1])
-                chain.append(following)
-            kept = [places[chain[0]]]
-            for node in chain[1:-1]:
-                if np.linalg.norm(places[node] - kept[-1]) > apart:
-                    kept.append(places[node])
-            found.append(np.stack([*kept, places[chain[-1]]]))
-    return found
+def _thinned(points: FloatArray, apart: float) -> FloatArray:
+    """Points (n, 3) of a curve with its ends, others left out that are nearer than that to the one before, L."""
+    kept = [0]
+    for k in range(1, len(points) - 1):
+        if np.linalg.norm(points[k] - points[kept[-1]]) > apart:
+            kept.append(k)
+    return points[[*kept, len(points) - 1]]
 
 
 def march(level: Callable[[FloatArray], FloatArray], box: FloatArray, spacing: float) -> tuple[FloatArray, IntArray]:

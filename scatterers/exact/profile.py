@@ -24,8 +24,8 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from creeping._typing import FloatArray
 from scatterers.body import finite
 from scatterers.kernels.revolved import CONIC, SPLINE
 
@@ -36,7 +36,6 @@ MOST_TURN = np.pi / 2
 """Turn of the tangent between two points beyond which a profile is too coarse."""
 
 
-FloatArray = NDArray[np.float64]
 Pair = tuple[float, float]
 
 

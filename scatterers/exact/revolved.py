@@ -28,8 +28,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from creeping._typing import FloatArray, IntArray
 from scatterers.body import SHARP, Crease, NoCharts, Piece, PiecewiseBody, positive
 from scatterers.exact.profile import Segment
 from scatterers.kernels.compiled import Compiled
@@ -37,7 +37,7 @@ from scatterers.kernels.revolved import ROWS, SPLINE, WIDTH, evaluate, numbers
 from scatterers.kernels.tensor import HEADER
 
 if TYPE_CHECKING:
-    from scatterers.sphere_map.star import CubeSphereAtlas
+    from scatterers.charts.star import CubeSphereAtlas
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -45,9 +45,9 @@ from functools import cache
 from typing import NamedTuple
 
 from scatterers.cached import cached
+from scatterers.charts.radial import RadialMap, Spine
+from scatterers.charts.star import CubeSphereAtlas
 from scatterers.kernels.revolved import value_and_gradient
-from scatterers.sphere_map.radial import RadialMap, Spine
-from scatterers.sphere_map.star import CubeSphereAtlas
 
 SMALLEST = 1e-6
 """Turn of the tangent, radians, below which a corner is a joint, and an end on the axis no tip."""
@@ -70,9 +70,7 @@ SLACK = 0.1
 """By which the box of the map is wider than the body, in its half widths."""
 
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-Tiles = Callable[[float], tuple[FloatArray, FloatArray, NDArray[np.int64]]]
+Tiles = Callable[[float], tuple[FloatArray, FloatArray, IntArray]]
 
 
 class Squares(NamedTuple):
@@ -395,7 +393,7 @@ def strip(lower: int, upper: int) -> tuple[IntArray, IntArray]:
 
 @dataclass(frozen=True, eq=False)
 class RevolvedSpace:
-    """F of a body of revolution in a box; satisfies `scatterers.sphere_map.radial.SpaceLevel`.
+    """F of a body of revolution in a box; satisfies `scatterers.charts.radial.SpaceLevel`.
 
     Attributes
     ----------
@@ -409,7 +407,7 @@ class RevolvedSpace:
 
     def flat(self, of_map: FloatArray) -> FloatArray:
         """Parameters of the compiled functions: a grid of one cell, those of a map, those of the body."""
-        from scatterers.kernels.radial import one_cell
+        from scatterers.kernels.sphere_maps import one_cell
 
         return self.packed(one_cell(self.box, of_map))
 
@@ -436,6 +434,6 @@ def charts(bounds: FloatArray, tiles: Tiles, packed: Callable[[FloatArray], Floa
 @cache
 def _forward() -> Callable[..., None]:
     """The sphere map's function on this level, the same object at every call."""
-    from scatterers.kernels.radial import forward_over
+    from scatterers.kernels.sphere_maps import forward_over
 
     return forward_over(value_and_gradient, "body of revolution")

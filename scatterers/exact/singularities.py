@@ -8,11 +8,11 @@ beyond.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from creeping._typing import FloatArray
+from scatterers.charts.samples import Samples, towards
 from scatterers.exact.switches import ExpressionSpace
 from scatterers.kernels.compiled import SYMMETRIC, Compiled, evaluated
-from scatterers.spline.cloud import Samples, step_onto
 
 SINGULAR = 1e-6
 """|grad F| on the body, relative to its median there, below which a point is singular."""
@@ -38,9 +38,6 @@ SLACK = 0.12
 """By which the box is wider than the body, in its own half widths."""
 
 
-FloatArray = NDArray[np.float64]
-
-
 def singular_points(compiled: Compiled, points: FloatArray, size: float) -> FloatArray:
     """Points (m, 3) of the body to which Newton steps on grad F = 0 lead, from where |grad F| is smallest.
 
@@ -49,10 +46,7 @@ def singular_points(compiled: Compiled, points: FloatArray, size: float) -> Floa
     ValueError
         If grad F vanishes or is not finite all over F = 0.
     """
-    for _ in range(4):
-        value, gradient, _ = evaluated(compiled, points)
-        with np.errstate(all="ignore"):
-            points = points - (value / np.sum(gradient**2, axis=1))[:, None] * gradient
+    points = towards(compiled, points, 4)
     points = points[np.all(np.isfinite(points), axis=1)]
     slope = np.linalg.norm(evaluated(compiled, points)[1], axis=1)
     typical = float(np.median(slope))
@@ -85,7 +79,7 @@ def refuse_edges(compiled: Compiled, points: FloatArray, spacing: float) -> None
     """
     from scipy.spatial import cKDTree
 
-    points = _onto(compiled, points, spacing, 6)
+    points = towards(compiled, points, 6, spacing)
     points = points[np.all(np.isfinite(points), axis=1)]
     _, near = cKDTree(points).query(points, k=min(7, len(points)))
     a, b = (v.ravel() for v in np.broadcast_arrays(near[:, :1], near[:, 1:]))
@@ -93,7 +87,7 @@ def refuse_edges(compiled: Compiled, points: FloatArray, spacing: float) -> None
     most = np.argsort(-np.nan_to_num(turn))[:SUSPECTS]
     a, b = points[a[most]], points[b[most]]
     for _ in range(HALVINGS):
-        middle = _onto(compiled, 0.5 * (a + b), spacing, 6)
+        middle = towards(compiled, 0.5 * (a + b), 6, spacing)
         n = [_normals(compiled, one) for one in (a, middle, b)]
         first = np.linalg.norm(n[1] - n[0], axis=1) >= np.linalg.norm(n[2] - n[1], axis=1)
         a, b = np.where(first[:, None], a, middle), np.where(first[:, None], middle, b)
@@ -112,15 +106,6 @@ def _normals(compiled: Compiled, points: FloatArray) -> FloatArray:
     gradient = evaluated(compiled, points)[1]
     with np.errstate(all="ignore"):
         return np.asarray(gradient / np.linalg.norm(gradient, axis=1, keepdims=True))
-
-
-def _onto(compiled: Compiled, points: FloatArray, reach: float, steps: int) -> FloatArray:
-    """Newton steps along grad F, none longer than ``reach``."""
-    for _ in range(steps):
-        value, gradient, _ = evaluated(compiled, points)
-        step, _ = step_onto(value, gradient, reach)
-        points = points + np.where(np.isfinite(step), step, 0.0)
-    return points
 
 
 def kinks(compiled: Compiled, points: FloatArray, spacing: float, size: float) -> tuple[FloatArray, FloatArray]:
@@ -208,7 +193,7 @@ def is_tip(compiled: Compiled, place: FloatArray, size: float) -> bool:
 def _bend(compiled: Compiled, points: FloatArray, reach: float) -> tuple[FloatArray, FloatArray]:
     """|Hessian|/|grad F| (...), 0 where it is not known, at points brought onto the body by steps <= ``reach``."""
     with np.errstate(all="ignore"):
-        points = _onto(compiled, points, reach, 2 if np.isfinite(reach) else 0)
+        points = towards(compiled, points, 2 if np.isfinite(reach) else 0, reach)
         value, gradient, hessian = evaluated(compiled, points)
         slope = np.linalg.norm(gradient, axis=-1)
         bend = np.linalg.norm(hessian, axis=-1) / slope

@@ -28,8 +28,8 @@ from numba import njit, types
 # registers how numba passes such functions; else it does that itself after a first failure
 from numba.experimental import function_type as _function_type  # noqa: F401
 from numba.extending import typeof_impl
-from numpy.typing import NDArray
 
+from creeping._typing import FloatArray
 from creeping.kernels.cache import discard_stale
 from creeping.kernels.private_cache import keep_private
 
@@ -78,7 +78,7 @@ class Compiled:
 
     source: Callable[..., None]
     kind: Kind
-    parameters: NDArray[np.float64]
+    parameters: FloatArray
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
         make, *arguments = getattr(self.source, "again", (Compiled, self.source))
@@ -142,15 +142,13 @@ def call(function, *blocks):  # type: ignore[no-untyped-def]
     function(*blocks)
 
 
-def _columns(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[int, ...]]:
+def _columns(points: FloatArray) -> tuple[FloatArray, tuple[int, ...]]:
     """Points (..., 3) as the columns (3, n) of a block, and the shape (...)."""
     points = np.asarray(points, dtype=float)
     return np.ascontiguousarray(points.reshape(-1, 3).T), points.shape[:-1]
 
 
-def evaluated(
-    compiled: Compiled, points: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def evaluated(compiled: Compiled, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """F (...), its gradient (..., 3) and Hessian entries (..., 6), xx, yy, zz, yz, xz, xy, of a compiled level."""
     columns, shape = _columns(points)
     n = columns.shape[1]
@@ -159,7 +157,7 @@ def evaluated(
     return values.reshape(shape), gradients.T.reshape(*shape, 3), hessians.T.reshape(*shape, 6)
 
 
-def mapped(compiled: Compiled, s: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def mapped(compiled: Compiled, s: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Points (..., 3) and derivatives (..., 3, 3) of a compiled forward map."""
     columns, shape = _columns(s)
     points, derivatives = np.empty_like(columns), np.empty((9, columns.shape[1]))
@@ -167,7 +165,7 @@ def mapped(compiled: Compiled, s: NDArray[np.float64]) -> tuple[NDArray[np.float
     return points.T.reshape(*shape, 3), derivatives.T.reshape(*shape, 3, 3)
 
 
-def inverted(compiled: Compiled, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def inverted(compiled: Compiled, points: FloatArray) -> FloatArray:
     """What a compiled inverse map makes of points (..., 3)."""
     columns, shape = _columns(points)
     found = np.empty_like(columns)

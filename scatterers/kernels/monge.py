@@ -1,4 +1,4 @@
-"""Compiled parts of `scatterers.atlas.monge.atlas`: the locator, and the growth of charts; importing it imports numba.
+"""Compiled parts of `scatterers.charts.monge`: the locator, and the growth of charts; importing it imports numba.
 
 A chart grows over a graph of points of the body from its centre, in the order of rho = max(|q.E1|, |q.E2|),
 q = x - x0, so that it never leaps to another sheet over the same square. It ends before the first point with

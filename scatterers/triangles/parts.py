@@ -18,8 +18,8 @@ import importlib.util
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.triangles.topology import Edges, components, edges_of, flat_normals, oriented, umbrellas
 
 LISTED = 8
@@ -28,8 +28,6 @@ MOST_SHARED = 100_000
 """Edges of more than two triangles beyond which a mesh is soup, and left as it is."""
 
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Note = Callable[[str], None]
 
 
@@ -287,7 +285,7 @@ def _angles(vertices: FloatArray, triangles: IntArray, ends: IntArray, corners: 
     return np.asarray(np.arctan2(across @ np.cross(along, across[0]), across @ across[0]) % (2 * np.pi))
 
 
-def _pairs(angle: FloatArray, forward: NDArray[np.bool_], sheet: IntArray) -> IntArray:
+def _pairs(angle: FloatArray, forward: BoolArray, sheet: IntArray) -> IntArray:
     """Pairs (k, 2) of triangles about an edge that belong together; what is left over has an open edge there.
 
     First those of one sheet, then those between which the body is, one within the other, then the flattest.

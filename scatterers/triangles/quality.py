@@ -27,8 +27,8 @@ from dataclasses import dataclass, fields
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.triangles.jets import Jets, angle_weighted_normals
 from scatterers.triangles.parts import capped, chosen_part, taken_apart, united
 from scatterers.triangles.topology import cleaned, oriented
@@ -53,8 +53,6 @@ FEWEST_RIMS, JUMPS_ALONG = 6, 0.5
 """Vertices that make a rim; jumps, in roots of the number of vertices, that make a curve over the body."""
 
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Verdict = Literal["smooth", "noisy", "sharp", "curvature jumps", "too coarse"]
 
 
@@ -114,7 +112,7 @@ class MeshQuality:
         return f"MeshQuality({self.verdict}: {self.vertices} vertices, {self.bad_share:.2%} bad)\n{self.reasons}"
 
     @property
-    def bad(self) -> NDArray[np.bool_]:
+    def bad(self) -> BoolArray:
         """Which vertices are bad (n,)."""
         return self.badness > BAD
 
@@ -206,7 +204,7 @@ def assess(vertices: FloatArray, triangles: IntArray, jets: Jets) -> MeshQuality
     return MeshQuality(**quality, verdict=verdict, reasons=reasons)
 
 
-def jumps_at(jets: Jets, edge: float) -> NDArray[np.bool_]:
+def jumps_at(jets: Jets, edge: float) -> BoolArray:
     """Vertices (n,) at which the curvature jumps, by jets on a mesh with this mean edge, L."""
     curvature, doubt = np.abs(jets.principal).max(axis=1), _doubt(jets)
     _, fourth, sixth = np.maximum(jets.residuals, ROUNDING * edge).T

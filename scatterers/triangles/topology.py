@@ -18,7 +18,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from creeping._typing import BoolArray, FloatArray, IntArray
 
 CLOSE = (1e-6, 1e-5, 1e-4)
 """Distance of vertices on open edges that are merged, in diagonals of the body: single precision, and a few digits."""
@@ -28,8 +29,6 @@ KEPT = 1000
 """Pairs that are returned at most."""
 
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Note = Callable[[str], None]
 
 
@@ -51,7 +50,7 @@ class Edges(NamedTuple):
     ends: IntArray
     faces: IntArray
     number: IntArray
-    forward: NDArray[np.bool_]
+    forward: BoolArray
 
     @property
     def sides(self) -> IntArray:
@@ -248,7 +247,7 @@ def next_corner(corner: IntArray) -> IntArray:
     return corner - corner % 3 + (corner + 1) % 3
 
 
-def _turned(name: str, count: int, pairs: IntArray, agree: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _turned(name: str, count: int, pairs: IntArray, agree: BoolArray) -> BoolArray:
     """Triangles to turn so that all agree with their neighbours."""
     left, right = pairs.T
     starts = np.concatenate([left, left + count])
@@ -257,6 +256,41 @@ def _turned(name: str, count: int, pairs: IntArray, agree: NDArray[np.bool_]) ->
     if np.any(label[:count] == label[count:]):
         raise ValueError(f"{name} has one side only, like a Moebius strip or Klein bottle; give a body")
     return np.asarray(label[:count] > label[count:])
+
+
+def cut(vertices: FloatArray, triangles: IntArray, edge: IntArray, at: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Vertices and triangles of a mesh (n, 3) and (m, 3) with more vertices (c, 3) on its edges with numbers (c,).
+
+    Triangles with such edges fall into two, three or four.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> points = np.array([[0.5, 0.5, 0], [0.5, 0, 0.5]])
+    >>> cut(np.eye(3), np.array([[0, 1, 2]]), np.array([0, 1]), points)[1].tolist()
+    [[0, 3, 4], [3, 1, 4], [1, 2, 4]]
+    """
+    edges = edges_of(triangles)
+    new = np.full(len(edges.ends), -1)
+    new[edge] = len(vertices) + np.arange(len(edge))
+    # on the edges that follow the corners
+    between = new[edges.number].reshape(-1, 3)
+    count = (between >= 0).sum(axis=1)
+    parts = [triangles[count == 0]]
+    for number in (1, 2, 3):
+        t, m = triangles[count == number].copy(), between[count == number].copy()
+        for _ in range(2):
+            # turned until the first edge is cut, of two cuts the last as well
+            wrong = (m[:, 0] < 0) | ((m[:, 2] < 0) & (number == 2))
+            t[wrong], m[wrong] = np.roll(t[wrong], -1, axis=1), np.roll(m[wrong], -1, axis=1)
+        (a, b, c), (ab, bc, ca) = t.T, m.T
+        split = {
+            1: [(a, ab, c), (ab, b, c)],
+            2: [(a, ab, ca), (ab, b, ca), (b, c, ca)],
+            3: [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)],
+        }[number]
+        parts += [np.stack(part, axis=1) for part in split]
+    return np.concatenate([vertices, at]), np.concatenate(parts)
 
 
 def components(count: int, starts: IntArray, ends: IntArray) -> tuple[int, IntArray]:

@@ -14,8 +14,8 @@ from cad_files import made
 import creeping as cr
 import scatterers as sc
 from creeping.geometry.surface import normal, project
-from scatterers.cad_file import files as _cad_files
-from scatterers.cad_file.files import CadReading, read_cad
+from scatterers.triangles import cad_file as _cad_files
+from scatterers.triangles.cad_file import CadReading, read_cad
 from scatterers.triangles.quality import Choice
 from scatterers.triangles.topology import edges_of
 

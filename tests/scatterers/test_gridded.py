@@ -11,10 +11,10 @@ import creeping as cr
 import scatterers as sc
 from creeping.geodesics.bundle import project_bundle, random_bundle_points
 from creeping.geometry.surface import normal
+from scatterers.charts.radial import Spine
+from scatterers.fits.tensor import TensorSpline, coefficients, interpolation_operator
 from scatterers.kernels.compiled import SYMMETRIC
 from scatterers.kernels.tensor import POWERS
-from scatterers.sphere_map.radial import Spine
-from scatterers.spline.tensor import TensorSpline, coefficients, interpolation_operator
 
 PARENT = sc.TwistedEllipsoid()
 

@@ -12,8 +12,8 @@ from tolerances import TRACE
 
 import creeping as cr
 from creeping.geodesics.bundle import random_bundle_points
+from scatterers.charts.samples import body_cloud
 from scatterers.implicit import Implicit
-from scatterers.spline.cloud import body_cloud
 
 COLUMNS = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
 LENGTH = 1e-7
@@ -207,7 +207,7 @@ def test_rays_are_those_of_the_exact_body(name, rng):
 
 def test_charts_that_cannot_be_are_sought_once(monkeypatch):
     """To find that out takes as long as charts do."""
-    from scatterers.atlas.monge.atlas import MongeAtlas
+    from scatterers.charts.monge import MongeAtlas
 
     asked = []
 

@@ -17,8 +17,8 @@ from body_checks import directions, normal_curvature, rms, shape_operator, unit
 import creeping as cr
 import scatterers as sc
 from creeping.geometry.surface import normal, project
-from scatterers.spline import cache as _fit_cache
-from scatterers.spline.cloud import FitReport
+from scatterers.fits import cache as _fit_cache
+from scatterers.fits.cloud import FitReport
 from tests.exact_meshes import capsule, geodesic_sphere, on_body, scattered, torus_grid
 
 NAMES = ("ellipsoid", "torus", "twisted")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from scatterers.pieces.regions import regions_of
+from scatterers.triangles.regions import regions_of
 from tests.exact_meshes import geodesic_sphere, torus_grid
 
 

@@ -8,12 +8,12 @@ from body_checks import directions, rms, unit
 
 import scatterers as sc
 from creeping.geometry.directions import fibonacci_directions
+from scatterers.fits import solver as _fitting
+from scatterers.fits.solver import _Equations, fit, fourth_bands, ranges
+from scatterers.fits.tensor import Cardinal, TensorSpline, coefficients
 from scatterers.kernels.compiled import evaluated
-from scatterers.kernels.normal_equations import accumulate, subtract_roughness
+from scatterers.kernels.least_squares import accumulate, subtract_roughness
 from scatterers.kernels.tensor import OVERREAD
-from scatterers.spline import fitting as _fitting
-from scatterers.spline.fitting import _Equations, fit, fourth_bands, ranges
-from scatterers.spline.tensor import Cardinal, TensorSpline, coefficients
 
 SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 TRIAXIAL = sc.Ellipsoid(1.0, 0.8, 0.6)

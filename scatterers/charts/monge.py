@@ -1,4 +1,12 @@
-"""Atlas of Monge charts for a smooth closed body of any genus (`scatterers.atlas.monge.charts`).
+"""Monge charts of a body F = 0, graphs over squares in its tangent planes, and an atlas of them, for any genus.
+
+With x0 on the body, N = n(x0), E1 and E2 tangent, E1 x E2 = N, w the half width, and g = grad F,
+
+    x(u, v) = x0 + q + h N,   q = w ((2u - 1) E1 + (2v - 1) E2),   F(x(u, v)) = 0,
+    x_u = 2w (E1 - N (g.E1)/(g.N)),   x_v = 2w (E2 - N (g.E2)/(g.N)).
+
+h is followed from the centre of the square: over s q, s in STEPS, Newton steps h <- h - F/(g.N) start from the Taylor
+series of the place before, dh/ds = -(g.q)/(g.N).
 
 A point belongs to the chart for which max(|2u - 1|, |2v - 1|) is least, (2u - 1, 2v - 1) = (E1, E2).(x - x0)/w, among
 those listed for its voxel with n.N >= VALID and the height within bounds. The polar frame of such a chart is the
@@ -15,13 +23,37 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scatterers.atlas.monge.charts import Field, FloatArray, MongeChart, MongeCharts
-from scatterers.atlas.monge.cover import VALID, Cover, covered_by, probes
+from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.cached import cached
+from scatterers.charts.cover import VALID, Cover, Field, MongeCharts, covered_by, probes
 from scatterers.kernels.compiled import Compiled, call
 from scatterers.kernels.monge import CHART, FIRST, LEAN, OUTSIDE, VOXELS
+
+
+@dataclass(frozen=True, eq=False)
+class MongeChart:
+    """One chart of the atlas."""
+
+    graph: MongeCharts
+    periodic: tuple[bool, bool] = (False, False)
+
+    def point(self, uv: FloatArray) -> FloatArray:
+        """Point of the body: (..., 2) -> (..., 3), L."""
+        uv = np.asarray(uv, dtype=float)
+        flat = uv.reshape(-1, 2)
+        # the nodes of a map repeat (u, v) for every angle
+        single, where = np.unique(flat[:, 0] + 1j * flat[:, 1], return_inverse=True)
+        points = self.graph.points(np.stack([single.real, single.imag], axis=-1))
+        return points[where].reshape(*uv.shape[:-1], 3)
+
+    def tangents(self, uv: FloatArray) -> FloatArray:
+        """Columns x_u, x_v: (..., 2) -> (..., 3, 2), L."""
+        e, n = self.graph.axes[:2], self.graph.axes[2]
+        g = self.graph.gradient(self.point(uv))
+        slope = (g @ e.T) / self.graph._lean(g, n)[..., None]
+        return np.asarray(2 * self.graph.half * (e.T - n[:, None] * slope[..., None, :]))
+
 
 # times that the cloud is completed where the atlas misses a point between
 ROUNDS = 4
@@ -59,7 +91,7 @@ class MongeAtlas:
         level, gradient, hessian : callable
             F and its derivatives, (..., 3) -> (...), (..., 3) and (..., 3, 3).
         cloud : (n, 3), L
-            Points spread evenly over the whole body, such as `scatterers.spline.cloud.body_cloud` gives, a tenth of the
+            Points spread evenly over the whole body, such as `scatterers.fits.cloud.body_cloud` gives, a tenth of the
             least radius of curvature apart or less.
         margin : float
             How far charts reach beyond their unit squares, in half widths: splines have nodes there.
@@ -85,7 +117,7 @@ class MongeAtlas:
             f"{missed[0].round(4).tolist()}); give a denser cloud, or a body without thin or sharp parts"
         )
 
-    def _holds(self, points: FloatArray) -> NDArray[np.bool_]:
+    def _holds(self, points: FloatArray) -> BoolArray:
         """Whether points (n, 3) are in the unit squares of their charts and, tried for each eighth, on their sheet."""
         chart, uv = self.locate(points)
         inside = (chart >= 0) & np.all((uv >= 0) & (uv <= 1), axis=-1)
@@ -99,7 +131,7 @@ class MongeAtlas:
         """All charts."""
         return tuple(MongeChart(self.graphs[k]) for k in range(len(self.graphs.half)))
 
-    def locate(self, points: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
+    def locate(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
         """Chart number (...) and chart variables (..., 2) of points (..., 3); -1 and NaN where there is none."""
         x = np.ascontiguousarray(np.reshape(points, (-1, 3)).T, dtype=float)
         normal, n = np.ascontiguousarray(self.graphs.gradient(x.T).T), x.shape[1]

@@ -8,7 +8,7 @@ the body's longest,
 an upright body has T = 1. With y = A s and g = DT^T grad F(x): d psi/ds = r DT (A - y (A g)^T/(g.y)), and
 psi^-1(x) = A^-1 (w - c)/|A^-1 (w - c)|, w = T^-1(x). Every ray meets the body once where g.(w - c) > 0 on all of it.
 The root is found by Newton steps from r = 1, halved into the bracket when they leave it; beyond the grid counts as
-outside the body. `scatterers.kernels.radial` has the compiled functions.
+outside the body. `scatterers.kernels.sphere_maps` has the compiled functions.
 
 Sources: Derivations, B4.
 """
@@ -75,18 +75,12 @@ class Spine:
 
     def shift(self, points: FloatArray) -> FloatArray:
         """T(w) - w = x - T^-1(x), L: (..., 3) -> (..., 3)."""
-        found = np.asarray(points, dtype=float)
-        if not found.ndim or found.shape[-1] != 3:
-            raise ValueError(f"points have shape {found.shape}; the last axis must hold x, y, z")
-        t: FloatArray = (found[..., self.axis] - self.middle) / self.half
+        t: FloatArray = (np.asarray(points, dtype=float)[..., self.axis] - self.middle) / self.half
         return np.moveaxis(np.asarray(polynomial.polyval(t.clip(-REACH, REACH), self.shifts)), 0, -1)
 
     def slope(self, points: FloatArray) -> FloatArray:
         """Derivative of the shift along the axis, without unit: (..., 3) -> (..., 3)."""
-        found = np.asarray(points, dtype=float)
-        if not found.ndim or found.shape[-1] != 3:
-            raise ValueError(f"points have shape {found.shape}; the last axis must hold x, y, z")
-        t: FloatArray = (found[..., self.axis] - self.middle) / self.half
+        t: FloatArray = (np.asarray(points, dtype=float)[..., self.axis] - self.middle) / self.half
         found = polynomial.polyval(t.clip(-REACH, REACH), polynomial.polyder(self.shifts)) / self.half
         return np.moveaxis(np.where(np.abs(t) > REACH, 0.0, found), 0, -1)
 
@@ -185,13 +179,13 @@ class RadialMap(SphereMapped):
     @cached_property
     def compiled_inverse(self) -> Compiled:
         """Compiled psi^-1."""
-        from scatterers.kernels.radial import inverse
+        from scatterers.kernels.sphere_maps import inverse
 
         return Compiled(inverse, "inverse", self.parameters)
 
     @cached_property
     def compiled_locator(self) -> Compiled:
         """Compiled locator of the six charts over psi."""
-        from scatterers.kernels.radial import locate
+        from scatterers.kernels.sphere_maps import locate
 
         return Compiled(locate, "locator", self.parameters)

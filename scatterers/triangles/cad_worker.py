@@ -1,4 +1,4 @@
-"""What gmsh says of a CAD file, in a process of its own: ``python -P worker.py FILE POINTS OUT [CURVED [SEW]]``.
+"""What gmsh says of a CAD file, in a process of its own: ``python -P cad_worker.py FILE POINTS OUT [CURVED [SEW]]``.
 
 gmsh keeps its state in the library, prints as it likes, and may end the process on a hostile file or where libraries
 of the system are missing. With CURVED, triangles are smaller where faces curve: so many to a full turn;

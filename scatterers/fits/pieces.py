@@ -25,10 +25,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.body import Crease
-from scatterers.pieces.patch import (
+from scatterers.fits.cloud import FitReport, curvatures, differences, rms
+from scatterers.fits.patch import (
     SLIGHT,
     SPACING,
     TIP,
@@ -40,12 +41,11 @@ from scatterers.pieces.patch import (
     spline_patch,
     tip_of,
 )
-from scatterers.pieces.regions import Regions
-from scatterers.pieces.selection import PieceSpace, piece_space, voxel_side
-from scatterers.spline.cloud import FitReport, curvatures, differences, rms
-from scatterers.spline.fitting import COARSER, SMOOTHING
+from scatterers.fits.selection import PieceSpace, piece_space, voxel_side
+from scatterers.fits.solver import COARSER, SMOOTHING
 from scatterers.triangles.jets import FEWEST, Jets, angle_weighted_normals, osculating_jets
 from scatterers.triangles.quality import BAD
+from scatterers.triangles.regions import Regions
 from scatterers.triangles.topology import components, flat_normals
 
 FOLD = 3.0
@@ -76,11 +76,6 @@ SLOPES = (0.5, 1.6)
 """|grad F| at the points: beyond, nothing of a piece is trusted either."""
 SMALL = 0.02
 """Triangles of a region that may be absorbed, relative to those of the quadric's."""
-
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 
 def astray(space: PieceSpace, patches: list[Patch], points: FloatArray, owner: IntArray, size: float) -> FloatArray:

@@ -90,8 +90,8 @@ class TensorSpline(Levelled):
 
     @property
     def sources(self) -> dict[str, Callable[..., None]]:
-        """Plain Python of the compiled functions; see `scatterers.sphere_map.radial.SpaceLevel`."""
-        from scatterers.kernels.radial import forward
+        """Plain Python of the compiled functions; see `scatterers.charts.radial.SpaceLevel`."""
+        from scatterers.kernels.sphere_maps import forward
         from scatterers.kernels.tensor import evaluate
 
         return {"level": evaluate, "forward": forward}

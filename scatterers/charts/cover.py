@@ -8,17 +8,100 @@ cloud: so what lies between is covered too. Gaps are measured by `probes`, point
 The greedy rule is that of [C79]; Derivations, B3.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from heapq import heapify, heapreplace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.spatial import cKDTree
 
-from scatterers.atlas.monge.charts import Field, FloatArray, MongeCharts
+from creeping._typing import BoolArray, FloatArray, IntArray
 
-IntArray = NDArray[np.int64]
+Field = Callable[[FloatArray], FloatArray]
+STEPS = (0.3, 0.55, 0.75, 0.9, 1.0)
+# n.N below which a graph over the tangent plane is not followed
+STEEP = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class MongeCharts:
+    """Charts by their squares, or one of them with (...) = ().
+
+    Attributes
+    ----------
+    level, gradient : callable
+        F and its gradient, (..., 3) -> (...) and (..., 3).
+    centres : (..., 3), L
+    axes : (..., 3, 3)
+        Rows E1, E2, N.
+    half : (...), L
+        Half widths.
+    bend : (..., 2, 2), 1/L
+        Second derivatives of h at the centres.
+    """
+
+    level: Field
+    gradient: Field
+    centres: FloatArray
+    axes: FloatArray
+    half: FloatArray
+    bend: FloatArray
+
+    def __getitem__(self, index: int | IntArray) -> "MongeCharts":
+        parts = (np.asarray(v[index]) for v in (self.centres, self.axes, self.half, self.bend))
+        return MongeCharts(self.level, self.gradient, *parts)
+
+    def points(self, uv: FloatArray) -> FloatArray:
+        """Points of the body, L, over (u, v) (..., 2), broadcast against the charts: (..., 3)."""
+        e1, e2, n = np.moveaxis(self.axes, -2, 0)
+        s = 2 * uv - 1
+        half = self.half[..., None]
+        q = half * (s[..., :1] * e1 + s[..., 1:] * e2)
+        # h, dh/ds and d2h/ds2 at the centre
+        h, slope = np.zeros(q.shape[:-1]), np.zeros(q.shape[:-1])
+        bend = self.half**2 * np.einsum("...i,...ij,...j->...", s, self.bend, s)
+        last = 0.0
+        for step in STEPS:
+            ds = step - last
+            h = h + ds * (slope + 0.5 * ds * bend)
+            h, moved, g = self._newton(step * q, h, 2 if step < 1 else 12)
+            along = -np.sum(g * q, axis=-1) / self._lean(g, n)
+            bend, slope, last = (along - slope) / ds, along, step
+        x = self.centres + q + h[..., None] * n
+        lost = ~(moved <= 1e-9 * self.half)
+        if lost.any():
+            # beyond the reach of a chart there may be nothing over a point: any place on the body keeps rays finite
+            x[lost] = _nearest(self.level, self.gradient, x[lost], np.broadcast_to(self.half, lost.shape)[lost])
+        return np.asarray(x)
+
+    def _newton(self, q: FloatArray, h: FloatArray, most: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Height over q, length of the last step, and the gradient before it."""
+        n = self.axes[..., 2, :]
+        for _ in range(most):
+            x = self.centres + q + h[..., None] * n
+            g = self.gradient(x)
+            step = np.clip(-self.level(x) / self._lean(g, n), -0.25 * self.half, 0.25 * self.half)
+            h = h + step
+            moved = np.abs(step)
+            if np.all(moved <= 1e-10 * self.half):
+                break
+        return h, moved, g
+
+    @staticmethod
+    def _lean(g: FloatArray, n: FloatArray) -> FloatArray:
+        """g.N, kept away from zero."""
+        return np.asarray(np.maximum(np.sum(g * n, axis=-1), STEEP * np.linalg.norm(g, axis=-1) + 1e-300))
+
+
+def _nearest(level: Field, gradient: Field, x: FloatArray, reach: FloatArray) -> FloatArray:
+    for _ in range(20):
+        g = gradient(x)
+        norm = np.linalg.norm(g, axis=-1) + 1e-300
+        x = x - (np.clip(level(x) / norm, -0.25 * reach, 0.25 * reach) / norm)[:, None] * g
+    return x
+
+
 # least n.N on the widened square, on points that a chart covers, and on points that look for their chart
 LEAST, FACING, VALID = 0.2, 0.45, 0.4
 # largest w max(kappa)
@@ -210,7 +293,7 @@ class _Candidates:
             self.covered += [lists[k] if not torn[k] else lists[k][:0] for k in np.flatnonzero(good)]
             start, angle, longest = start[~good], angle[~good], SHRINK * half[~good]
 
-    def _torn(self, graphs: MongeCharts, side: int) -> NDArray[np.bool_]:
+    def _torn(self, graphs: MongeCharts, side: int) -> BoolArray:
         """Charts over whose widened squares, tried at side x side points, there is no graph."""
         s = np.linspace(-self.wider, self.wider, side)
         uv = 0.5 + 0.5 * np.stack(np.meshgrid(s, s), axis=-1).reshape(-1, 1, 2)

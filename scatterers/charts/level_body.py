@@ -1,7 +1,7 @@
 """Bodies given by an F in a box of space, whatever its kind: charts, parameters, compiled level.
 
-A star-shaped body, upright or along a bent spine, has the sphere map of `scatterers.sphere_map.radial` and by it six
-charts; any other body has the Monge charts of `scatterers.atlas.monge.atlas`.
+A star-shaped body, upright or along a bent spine, has the sphere map of `scatterers.charts.radial` and by it six
+charts; any other body has the Monge charts of `scatterers.charts.monge`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,14 +14,15 @@ import numpy as np
 from creeping._typing import FloatArray
 from scatterers.body import Body, Levelled, polar_angles
 from scatterers.cached import cached
+from scatterers.charts.radial import RadialMap, SpaceLevel
+from scatterers.charts.samples import Samples
+from scatterers.charts.star import CubeSphereAtlas, FaceChart
 from scatterers.kernels.compiled import Compiled
 from scatterers.kernels.tensor import CENTRE, HEADER
-from scatterers.sphere_map.radial import RadialMap, SpaceLevel
-from scatterers.sphere_map.star import CubeSphereAtlas, FaceChart
-from scatterers.spline.cloud import Samples
 
 if TYPE_CHECKING:
-    from scatterers.atlas.monge.atlas import MongeAtlas
+    from scatterers.charts.monge import MongeAtlas
+
 
 CLOUDS = (25_000, 100_000)
 """Points of the body by which charts are chosen, the more if the fewer do not do."""
@@ -103,8 +104,8 @@ class LevelBody(Levelled, Body):
         """Make the atlas."""
         if self._map is not None:
             return CubeSphereAtlas(self._map, self._map.compiled_locator)
-        from scatterers.atlas.monge.atlas import MongeAtlas
-        from scatterers.spline.cloud import body_cloud
+        from scatterers.charts.monge import MongeAtlas
+        from scatterers.charts.samples import body_cloud
 
         if self._charts:
             return MongeAtlas.restored(self.level, self.gradient, self._charts)

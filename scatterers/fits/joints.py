@@ -1,6 +1,6 @@
 """Joints in a mesh: curves where the curvature jumps while the normal does not, found between planes and quadrics.
 
-Planes and quadrics Q_k = 0 are found first (`scatterers.pieces.joints`). Only if they hold all vertices of the
+Planes and quadrics Q_k = 0 are found first (`scatterers.fits.joints`). Only if they hold all vertices of the
 mesh is there a joint at all: a surface whose curvature merely varies is on no quadric. On either side of a joint of i
 and j, s across it,
 
@@ -8,8 +8,6 @@ and j, s across it,
 
 t across: the normals, not the values, change sign. Of an edge of the mesh that goes across, (n_i - n_j).t = 0 gives the
 point of the joint on it; the mesh is cut there, so that each triangle is one quadric's and joints are edges.
-
-Also here: a mesh cut at points of its edges: triangles with such edges fall into two, three or four.
 
 Also here: planes and quadrics that a mesh is made of, and which of its vertices each holds.
 
@@ -27,11 +25,11 @@ Sources: Derivations, B13.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scatterers.pieces.patch import Closeness, Patch, polynomial_patch
+from creeping._typing import BoolArray, FloatArray, IntArray
+from scatterers.fits.patch import Closeness, Patch, polynomial_patch
 from scatterers.triangles.jets import angle_weighted_normals
-from scatterers.triangles.topology import components, edges_of, flat_normals
+from scatterers.triangles.topology import components, cut, edges_of, flat_normals
 
 SMOOTH = 0.02
 """Angle between the normals of two quadrics, radians, up to which they may join there without an edge."""
@@ -57,11 +55,6 @@ TIPS, NEARLY = 100, 100.0
 """Vertices that may be tips, and their distance in that within which others are held: Q changes with its square."""
 STEEP = 1e-3
 """Slope of a quadric, relative to the median, below which it has no normal: the tip of a cone."""
-
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 
 class Sheet:
@@ -218,65 +211,6 @@ def _parts(count: int, ends: IntArray, some: BoolArray) -> IntArray:
 
 
 @dataclass(frozen=True, eq=False)
-class Cuts:
-    """Where edges are cut.
-
-    Attributes
-    ----------
-    edge : (k,)
-        In the order of `scatterers.triangles.topology.edges_of`.
-    points : (k, 3), L
-    held : (k, p) bool
-        Which sheets hold the points.
-    """
-
-    edge: IntArray
-    points: FloatArray
-    held: BoolArray
-
-
-def cut(
-    vertices: FloatArray, triangles: IntArray, held: BoolArray, cuts: Cuts
-) -> tuple[FloatArray, IntArray, BoolArray]:
-    """Vertices, triangles, and which sheets hold each vertex, of the mesh with more vertices on its edges.
-
-    Parameters
-    ----------
-    vertices, triangles : (n, 3), L, and (m, 3)
-    held : (n, p) bool
-    cuts : Cuts
-
-    Examples
-    --------
-    >>> corners, triangles = np.eye(3), np.array([[0, 1, 2]])
-    >>> cuts = Cuts(np.array([0, 1]), np.array([[0.5, 0.5, 0], [0.5, 0, 0.5]]), np.zeros((2, 1), dtype=bool))
-    >>> cut(corners, triangles, np.zeros((3, 1), dtype=bool), cuts)[1].tolist()
-    [[0, 3, 4], [3, 1, 4], [1, 2, 4]]
-    """
-    edges = edges_of(triangles)
-    new = np.full(len(edges.ends), -1)
-    new[cuts.edge] = len(vertices) + np.arange(len(cuts.edge))
-    # on the edges that follow the corners
-    between = new[edges.number].reshape(-1, 3)
-    count = (between >= 0).sum(axis=1)
-    parts = [triangles[count == 0]]
-    for number in (1, 2, 3):
-        t, m = triangles[count == number].copy(), between[count == number].copy()
-        for _ in range(2):
-            # turned until the first edge is cut, of two cuts the last as well
-            wrong = (m[:, 0] < 0) | ((m[:, 2] < 0) & (number == 2))
-            t[wrong], m[wrong] = np.roll(t[wrong], -1, axis=1), np.roll(m[wrong], -1, axis=1)
-        (a, b, c), (ab, bc, ca) = t.T, m.T
-        split = {
-            1: [(a, ab, c), (ab, b, c)],
-            2: [(a, ab, ca), (ab, b, ca), (b, c, ca)],
-            3: [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)],
-        }[number]
-        parts += [np.stack(part, axis=1) for part in split]
-    return np.concatenate([vertices, cuts.points]), np.concatenate(parts), np.concatenate([held, cuts.held])
-
-
-@dataclass(frozen=True, eq=False)
 class Jointed:
     """A mesh that is cut along its joints.
 
@@ -332,8 +266,8 @@ def jointed(
         found = _placed(vertices, ends, held, sheets)
     if found.open.any() or len(sheets) < 2:
         return None
-    corners, t, held = cut(found.points, triangles, found.held, found.cuts)
-    return _labelled(corners, t, held, sheets, noise)
+    corners, t = cut(found.points, triangles, found.edge, found.at)
+    return _labelled(corners, t, found.held, sheets, noise)
 
 
 @dataclass(frozen=True, eq=False)
@@ -343,16 +277,18 @@ class _Placed:
     Attributes
     ----------
     points : (n, 3), L
-    held : (n, k) bool
-        Which sheets hold them.
-    cuts : Cuts
+    edge, at : (c,) and (c, 3), L
+        Edges that are cut, and where.
+    held : (n + c, k) bool
+        Which sheets hold the vertices and the cuts.
     open : (e,) bool
         Edges whose ends neither a sheet nor a joint connects.
     """
 
     points: FloatArray
+    edge: IntArray
+    at: FloatArray
     held: BoolArray
-    cuts: Cuts
     open: BoolArray
 
 
@@ -379,7 +315,7 @@ def _placed(vertices: FloatArray, ends: IntArray, held: BoolArray, sheets: list[
     edge = np.concatenate([np.zeros(0, np.int64), *at])
     kept = still[edge]
     x, new = np.concatenate([np.zeros((0, 3)), *places]), np.concatenate([held[:0], *keep])
-    return _Placed(points, held, Cuts(edge[kept], x[kept], new[kept]), still & ~done)
+    return _Placed(points, edge[kept], x[kept], np.concatenate([held, new[kept]]), still & ~done)
 
 
 def _across(

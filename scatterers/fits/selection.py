@@ -21,13 +21,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from creeping._typing import FloatArray, IntArray
 from scatterers.body import Crease
+from scatterers.fits.tensor import TensorSpline
 from scatterers.kernels.compiled import Compiled, evaluated
-from scatterers.kernels.pieces import BESIDES, FIRST, LARGER, MOST_PIECES, SMALLER
-from scatterers.kernels.tensor import CENTRE, HEADER
-from scatterers.spline.tensor import TensorSpline
+from scatterers.kernels.tensor import BESIDES, CENTRE, HEADER, LARGER, MOST_PIECES, SMALLER, TABLES
 
 VOXELS = 500_000
 """Voxels about a body."""
@@ -45,8 +44,6 @@ STEEP = 0.5
 """cosine between that plane and the one at right angles to the body, below which it nearly touches the body."""
 
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Program = tuple[float, ...]
 
 
@@ -59,7 +56,7 @@ class PieceSpace:
     splines : sequence of TensorSpline
         F of each piece.
     table : (k,)
-        Header, table of voxels and programs, as `scatterers.kernels.pieces` takes them, without the splines; empty for
+        Header, table of voxels and programs, as `scatterers.kernels.tensor` takes them, without the splines; empty for
         one piece that is the whole body.
     """
 
@@ -69,9 +66,9 @@ class PieceSpace:
     @cached_property
     def compiled(self) -> Compiled:
         """Compiled level."""
-        from scatterers.kernels.pieces import evaluate
+        from scatterers.kernels.tensor import evaluate_pieces
 
-        return Compiled(evaluate, "level", self.parameters) if len(self.table) else self.splines[0].compiled
+        return Compiled(evaluate_pieces, "level", self.parameters) if len(self.table) else self.splines[0].compiled
 
     @cached_property
     def parameters(self) -> FloatArray:
@@ -84,12 +81,12 @@ class PieceSpace:
 
     def numbers(self, points: FloatArray) -> IntArray:
         """Pieces whose F is that of the body: (..., 3) -> (...)."""
-        from scatterers.kernels.pieces import numbers
+        from scatterers.kernels.tensor import piece_numbers
 
         columns = np.ascontiguousarray(points, dtype=float).reshape(-1, 3)
         found = np.zeros(len(columns), np.int64)
         if len(self.table):
-            numbers(columns, found, self.parameters)
+            piece_numbers(columns, found, self.parameters)
         return found.reshape(np.shape(points)[:-1])
 
     def check(self) -> None:
@@ -102,13 +99,13 @@ class PieceSpace:
         table, count = self.table, len(self.splines)
         shape = table[4:7]
         # written so that what is no number fails
-        sound = len(table) > FIRST and bool(np.all(np.isfinite(table))) and table[3] > 0
-        sound = sound and bool(np.all((shape >= 1) & (shape < 1e6))) and FIRST + np.prod(shape) < len(table)
+        sound = len(table) > TABLES and bool(np.all(np.isfinite(table))) and table[3] > 0
+        sound = sound and bool(np.all((shape >= 1) & (shape < 1e6))) and TABLES + np.prod(shape) < len(table)
         if sound:
             cells = int(np.prod(shape.astype(np.int64)))
-            tail = FIRST + cells
-            places = np.unique(table[FIRST:tail]).astype(np.int64)
-            sound = bool(np.all((places >= tail) & (places < len(table)))) and table[7] == FIRST
+            tail = TABLES + cells
+            places = np.unique(table[TABLES:tail]).astype(np.int64)
+            sound = bool(np.all((places >= tail) & (places < len(table)))) and table[7] == TABLES
             ends = places + 1 + table[places].clip(0, len(table)).astype(np.int64) if sound else places
             sound = sound and bool(np.all((table[places] >= 1) & (ends <= len(table))))
             sound = sound and all(_sound(table[a + 1 : b], count) for a, b in zip(places, ends, strict=True))
@@ -330,10 +327,10 @@ def _table(origin: FloatArray, side: float, shape: IntArray, programs: list[Prog
     places = np.empty(len(programs))
     for k, program in enumerate(programs):
         if program not in known:
-            known[program] = FIRST + cells + len(tail)
+            known[program] = TABLES + cells + len(tail)
             tail += [len(program), *program]
         places[k] = known[program]
-    header = [*origin, 1 / side, *shape, FIRST, 0.0]
+    header = [*origin, 1 / side, *shape, TABLES, 0.0]
     return np.concatenate([np.array(header, dtype=float), places[nearest], np.array(tail, dtype=float)])
 
 

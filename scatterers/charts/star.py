@@ -21,9 +21,9 @@ import numpy as np
 
 from creeping._typing import FloatArray, IntArray
 from scatterers.body import SphereMapped
+from scatterers.charts.radial import RadialMap, SpaceLevel, Spine
+from scatterers.charts.samples import Samples
 from scatterers.kernels.compiled import Compiled, evaluated, inverted, mapped
-from scatterers.sphere_map.radial import RadialMap, SpaceLevel, Spine
-from scatterers.spline.cloud import Samples
 
 CHECKED = 20000
 """Points of the body at which the centre is checked."""

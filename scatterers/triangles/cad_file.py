@@ -292,7 +292,7 @@ def _meshed(path: Path, points: int, sew: float | None, curved: int) -> dict[str
     with tempfile.TemporaryDirectory(prefix="creeping-") as folder:
         out = Path(folder) / "points.npz"
         # -P: modules that happen to lie in the working folder are not imported
-        worker = Path(__file__).with_name("worker.py")
+        worker = Path(__file__).with_name("cad_worker.py")
         command = [sys.executable, "-P", str(worker), str(path.resolve()), str(points), str(out)]
         command += [str(curved), repr(1e3 * float(sew or 0.0))]
         try:
@@ -360,7 +360,7 @@ def _creases(
 
     Where no face is known they are those of a mesh.
     """
-    from scatterers.pieces.regions import regions_of
+    from scatterers.triangles.regions import regions_of
 
     order = edges.sides
     between = of[order[:, 0] // 3] != of[order[:, 1] // 3]

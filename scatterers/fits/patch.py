@@ -5,7 +5,7 @@ which tell it from other quadrics through the points. It is taken if all points 
 size, as those of cylinders, cones and balls of engineering do, or if what is left, e over a length l, changes
 curvatures by 8 e/l^2 < `CLOSE` of the largest, as of cylinders that a program wrote as splines. As polynomials of
 degree 2 both kinds are splines of one cell, which go on as they are far beyond the region. Other regions are fitted as
-whole bodies are (`scatterers.spline.fitting`), from their own points only, so that nothing is rounded off at their
+whole bodies are (`scatterers.fits.solver`), from their own points only, so that nothing is rounded off at their
 borders; a coarser fit tells how far they are known.
 
 Also here: curved triangles: points between the corners of a mesh that has normals there, and a mesh made of them.
@@ -25,11 +25,11 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from creeping._typing import FloatArray, IntArray
+from scatterers.fits.solver import ACCURACY, COARSER, fit, spacing_of
+from scatterers.fits.tensor import TensorSpline
 from scatterers.kernels.tensor import POWERS
-from scatterers.spline.fitting import ACCURACY, COARSER, fit, spacing_of
-from scatterers.spline.tensor import TensorSpline
 from scatterers.triangles.jets import Jets, centroids, signed_distance
 
 EXACT = 1e-6
@@ -55,10 +55,6 @@ CLOSELY, ROUGHLY = ACCURACY, 3e-4
 """Change of the curvatures at which fits stop: from jets, and from points of curved triangles, which err by more."""
 MOST = 4_000_000
 """Triangles of a mesh that is made."""
-
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

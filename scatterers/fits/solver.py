@@ -29,12 +29,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from creeping._typing import BoolArray, FloatArray, IntArray
+from scatterers.fits.cloud import left_at, tangents
+from scatterers.fits.tensor import Cardinal, TensorSpline
 from scatterers.kernels.compiled import SYMMETRIC, evaluated
 from scatterers.kernels.tensor import OVERREAD
-from scatterers.spline.cloud import left_at, tangents
-from scatterers.spline.tensor import Cardinal, TensorSpline
 
 OFFSET_WEIGHT = 0.01
 """Of the samples at one cell's distance from the body."""
@@ -69,9 +69,6 @@ WATCHED = 2000
 """Points at which it is looked at."""
 
 
-FloatArray = NDArray[np.float64]
-
-
 @dataclass(frozen=True)
 class Fitted:
     """A spline with what its fit tells.
@@ -104,7 +101,7 @@ def fit(
     spacing: float,
     *,
     distance: Callable[[FloatArray], FloatArray] | None = None,
-    trusted: NDArray[np.bool_] | None = None,
+    trusted: BoolArray | None = None,
     mean_curvature: FloatArray | None = None,
     smoothing: float = SMOOTHING,
     normal_weight: float = 1.0,
@@ -209,7 +206,7 @@ class _Equations:
         spacing: float,
         smoothing: float,
         normal_weight: float,
-        trusted: NDArray[np.bool_] | None = None,
+        trusted: BoolArray | None = None,
     ) -> None:
         from scipy.spatial import cKDTree
 
@@ -240,7 +237,7 @@ class _Equations:
         # 70 is the square sum of a fourth difference's weights
         self.cardinal = Cardinal(1 / (density + FLOOR * density.max() + 210 * smoothing))
 
-    def _nearest(self, where: FloatArray) -> NDArray[np.int64]:
+    def _nearest(self, where: FloatArray) -> IntArray:
         """Points nearest to all nodes (m, 3), but for some spacings where they are many spacings off.
 
         A tree of points takes long where many are equally far, as in the middle of a body.
@@ -256,9 +253,7 @@ class _Equations:
         nearest[near] = self.tree.query(where[near])[1]
         return np.asarray(nearest)
 
-    def _plane_distance(
-        self, where: FloatArray, nearest: NDArray[np.int64] | None = None
-    ) -> tuple[FloatArray, FloatArray]:
+    def _plane_distance(self, where: FloatArray, nearest: IntArray | None = None) -> tuple[FloatArray, FloatArray]:
         """Distance (m,) to the tangent plane at the nearest point, far from it to the point; and to the point, L."""
         if nearest is None:
             nearest = self.tree.query(where)[1]
@@ -294,7 +289,7 @@ class _Equations:
             c = convolve1d(c, QUASI, axis=axis, mode="nearest")
         return np.concatenate([c.ravel(), np.zeros(OVERREAD)])
 
-    def _stray(self, values: FloatArray, off: FloatArray) -> NDArray[np.bool_]:
+    def _stray(self, values: FloatArray, off: FloatArray) -> BoolArray:
         """Nodes (m,) whose sign is wrong: parts of one sign that keep away from the points, which are so far off, L.
 
         At a sharp vertex of a coarse mesh the normal may lean so far that nodes in front of it lie behind its plane.
@@ -316,7 +311,7 @@ class _Equations:
         self, c: FloatArray, *, targets: bool, rough: bool = True, out: FloatArray | None = None
     ) -> FloatArray:
         """A^T W (b - A c) less the smoothing's gradient if rough, b = 0 unless targets; zero where c is not unknown."""
-        from scatterers.kernels.normal_equations import accumulate, subtract_roughness
+        from scatterers.kernels.least_squares import accumulate, subtract_roughness
 
         out = np.empty_like(c) if out is None else out
         out.fill(0.0)
@@ -338,7 +333,7 @@ class _Equations:
         self.cardinal(r[:-OVERREAD].reshape(self.shape), self.unknown, out[:-OVERREAD].reshape(self.shape))
         return out
 
-    def _seen(self) -> NDArray[np.bool_]:
+    def _seen(self) -> BoolArray:
         """Coefficients that some sample sees."""
         from scipy.ndimage import binary_dilation
 
@@ -416,7 +411,7 @@ def fourth_bands(shape: tuple[int, ...]) -> FloatArray:
     return np.ascontiguousarray(np.concatenate(parts, axis=1))
 
 
-def ranges(unknown: NDArray[np.bool_]) -> NDArray[np.int64]:
+def ranges(unknown: BoolArray) -> IntArray:
     """First number and the one behind the last (rows, 2) of what is unknown in rows along the last axis; 0, 0: none."""
     rows = unknown.reshape(-1, unknown.shape[-1])
     found = np.stack([rows.argmax(axis=1), rows.shape[1] - rows[:, ::-1].argmax(axis=1)], axis=1)

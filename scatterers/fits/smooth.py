@@ -12,12 +12,13 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scatterers.base.quadrics import Nearer, PointCloud
-from scatterers.spline.cloud import (
+from creeping._typing import BoolArray, FloatArray
+from scatterers.charts.samples import Samples
+from scatterers.fits.cloud import (
     FitReport,
-    Samples,
+    Nearer,
+    PointCloud,
     curvatures,
     differences,
     left_at,
@@ -26,7 +27,7 @@ from scatterers.spline.cloud import (
     rms,
     tangents,
 )
-from scatterers.spline.fitting import COARSER, MAX_NODES, SMOOTHING, Fitted, fit, spacing_of
+from scatterers.fits.solver import COARSER, MAX_NODES, SMOOTHING, Fitted, fit, spacing_of
 from scatterers.triangles.subdivision import BLIND, Source, turns, unseen
 
 FINER = 0.75
@@ -45,7 +46,6 @@ MOST_BLIND = 0.05
 """Share of the vertices of a mesh that is subdivided about which it may show nothing."""
 
 
-FloatArray = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 
@@ -116,7 +116,7 @@ def _turns(source: Source, fine: Fitted) -> FloatArray:
     return turns(source, partial(normal_curvatures, fine.spline))
 
 
-def _blind(source: Source, fine: Fitted) -> tuple[FloatArray, NDArray[np.bool_]]:
+def _blind(source: Source, fine: Fitted) -> tuple[FloatArray, BoolArray]:
     """By what the body turns within an edge at each vertex of a source, and where the fit is not to be trusted."""
     turn = _turns(source, fine)
     slope = curvatures(fine.spline, source.vertices)[2]
@@ -134,7 +134,7 @@ def fits(cloud: PointCloud, progress: Progress) -> tuple[Fitted, Fitted, float]:
         spacing: float,
         smoothing: float,
         weight: float,
-        some: NDArray[np.bool_] | slice = slice(None),
+        some: BoolArray | slice = slice(None),
     ) -> Fitted:
         return fit(
             of.points[some],

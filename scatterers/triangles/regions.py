@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.body import Crease
 from scatterers.triangles.topology import components, edges_of, flat_normals
 
@@ -25,11 +25,6 @@ FEWEST = 6
 """Edges of a chain, unless all are turned by more than `ALWAYS`, as those of a tetrahedron."""
 SLIVER = 1e-3
 """Area, relative to the median, below which the normal of a triangle is not asked."""
-
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +63,9 @@ class Regions:
         seam = ~self.crease & (sides[:, 0] != sides[:, 1])
         found: tuple[Crease, ...] = ()
         for kind, which in (("edge", self.crease & ~self.level), ("joint", self.level), ("seam", seam)):
-            found += _curves(vertices, self.turns, np.flatnonzero(which), piece, kind)
+            turns = np.radians(np.abs(self.turns.turn[which])) * (kind == "edge")
+            for pair, chain, edges in curves(self.turns.ends[which], sides[which], len(vertices)):
+                found += (Crease(kind, pair, vertices[chain], float(np.max(turns[edges]))),)
         return found
 
 
@@ -178,18 +175,18 @@ def _connected(count: int, pairs: IntArray) -> IntArray:
     return components(count, pairs[:, 0], pairs[:, 1])[1]
 
 
-def _curves(vertices: FloatArray, turns: Turns, at: IntArray, piece: IntArray, kind: str) -> tuple[Crease, ...]:
-    """Edges with numbers ``at`` joined to curves, one for each pair of pieces and stretch between branch points."""
-    pair = np.sort(piece[turns.sides[at]], axis=1)
-    meeting = np.bincount(turns.ends[at].ravel(), minlength=len(vertices))
+def curves(ends: IntArray, pair: IntArray, count: int) -> list[tuple[tuple[int, int], list[int], list[int]]]:
+    """Edges (k, 2) between ``count`` vertices, joined to curves: pieces on both sides, vertices, and edges by numbers.
+
+    There is one for each pair (k, 2) of pieces and stretch between points at which other than two edges meet.
+    """
+    meeting = np.bincount(ends.ravel(), minlength=count)
+    pairs, which = np.unique(np.sort(pair, axis=1), axis=0, return_inverse=True)
     found = []
-    pairs, which = np.unique(pair, axis=0, return_inverse=True)
     for k, (first, second) in enumerate(pairs.tolist()):
-        mine = at[which.ravel() == k]
-        for chain, edges in _chains(turns.ends[mine], meeting):
-            angle = float(np.radians(np.max(np.abs(turns.turn[mine[edges]])))) if kind == "edge" else 0.0
-            found.append(Crease(kind, (first, second), vertices[chain], angle))
-    return tuple(found)
+        mine = np.flatnonzero(which.ravel() == k)
+        found += [((first, second), chain, mine[edges].tolist()) for chain, edges in _chains(ends[mine], meeting)]
+    return found
 
 
 def _chains(ends: IntArray, meeting: IntArray) -> list[tuple[list[int], list[int]]]:
