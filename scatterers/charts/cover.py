@@ -17,6 +17,7 @@ from scipy.sparse import coo_array
 from scipy.spatial import cKDTree
 
 from creeping._typing import BoolArray, FloatArray, IntArray
+from scatterers.kernels.monge import CHART, FIRST
 
 Field = Callable[[FloatArray], FloatArray]
 STEPS = (0.3, 0.55, 0.75, 0.9, 1.0)
@@ -113,27 +114,6 @@ TURNS = 2
 # how much a chart that meets another sheet, or has no height, is shrunk, and how many times
 SHRINK, SHRINKS = 0.93, 8
 ROUNDS = 12
-
-
-@dataclass(frozen=True, eq=False)
-class Cover:
-    """Charts that cover a body.
-
-    Attributes
-    ----------
-    graphs : MongeCharts
-    heights : (m, 2), L
-        Bounds of the height over the unit square.
-    voxels : origin (3,), side, shape (3,)
-        Cubes that the points look up.
-    listed : (k, 4)
-        Voxel (i, j, k) and number of a chart to be tried there.
-    """
-
-    graphs: MongeCharts
-    heights: FloatArray
-    voxels: tuple[FloatArray, float, IntArray]
-    listed: IntArray
 
 
 def probes(level: Field, gradient: Field, cloud: FloatArray, *, seed: int) -> FloatArray:
@@ -319,10 +299,7 @@ class _Candidates:
                 found.append(k)
                 now = 0
             heapreplace(heap, (now, k))
-        return self._pruned(found)
-
-    def _pruned(self, found: list[int]) -> list[int]:
-        """Without those whose points others cover."""
+        # without those whose points others cover
         times = np.zeros(len(self.cloud.points), dtype=np.int64)
         for k in found:
             times[self.covered[k]] += 1
@@ -333,10 +310,6 @@ class _Candidates:
             else:
                 kept.append(k)
         return kept
-
-    def drop(self, k: int) -> None:
-        """Let a chart cover nothing."""
-        self.covered[k] = self.covered[k][:0]
 
     def bounds(self, k: int) -> FloatArray:
         """Bounds of the height over the unit square, for points between those of the cloud too."""
@@ -367,8 +340,10 @@ class _Candidates:
         return bad
 
 
-def covered_by(level: Field, gradient: Field, hessian: Field, points: FloatArray, margin: float) -> Cover:
-    """Choose charts that cover the body and all its cloud of points (n, 3), L.
+def covered_by(
+    level: Field, gradient: Field, hessian: Field, points: FloatArray, margin: float
+) -> tuple[MongeCharts, FloatArray]:
+    """Charts that cover the body and all its cloud of points (n, 3), L, and the parameters of their locator.
 
     Raises
     ------
@@ -387,12 +362,12 @@ def covered_by(level: Field, gradient: Field, hessian: Field, points: FloatArray
         if bad:
             candidates.add(candidates.start[bad], candidates.angle[bad], SHRINK**4 * candidates.half[bad])
             for k in bad:
-                candidates.drop(k)
+                candidates.covered[k] = candidates.covered[k][:0]
         missed = np.ones(len(points), dtype=bool)
         for k in which:
             missed[candidates.covered[k]] = False
         if not bad and not missed.any():
-            return _listed(candidates, graphs, which)
+            return graphs, _located(candidates, graphs, which)
         if not bad and missed.sum() >= before:
             break
         before = missed.sum()
@@ -405,9 +380,12 @@ def covered_by(level: Field, gradient: Field, hessian: Field, points: FloatArray
     )
 
 
-def _listed(candidates: _Candidates, graphs: MongeCharts, which: list[int]) -> Cover:
-    """The cover with its voxels: each lists the charts that suit the points of the body in it best, or nearly so."""
-    cloud = candidates.cloud
+def _located(candidates: _Candidates, graphs: MongeCharts, which: list[int]) -> FloatArray:
+    """Parameters of the locator of these charts, as `scatterers.kernels.monge` orders them.
+
+    Each voxel lists the charts that suit the points of the body in it best, or nearly so.
+    """
+    cloud, number = candidates.cloud, len(which)
     eps = 1.01 * float(cloud.gap.max())
     found = [candidates.valid(k) for k in which]
     point = np.concatenate([near for near, _ in found])
@@ -424,6 +402,20 @@ def _listed(candidates: _Candidates, graphs: MongeCharts, which: list[int]) -> C
     shape = (np.ceil((cloud.points.max(0) + 1.5 * eps - origin) / side)).astype(np.int64)
     corners = np.stack(np.meshgrid(*3 * [[-eps, eps]]), axis=-1).reshape(-1, 1, 3)
     voxel = np.floor((cloud.points[point] + corners - origin) / side).astype(np.int64)
-    listed = np.concatenate([voxel, np.broadcast_to(chart[:, None], (8, len(chart), 1))], axis=-1).reshape(-1, 4)
+    code = np.ravel_multi_index(tuple(np.moveaxis(voxel, -1, 0)), tuple(shape))
+    pairs = np.unique((code * number + chart).ravel())
+    code, chart = pairs // number, pairs % number
+    voxel, begin, count = np.unique(code, return_index=True, return_counts=True)
+    # behind the charts the table, an empty list, then that of each voxel with its length before it
+    first = FIRST + CHART * number
+    lists = first + int(np.prod(shape))
+    entry = lists + 1 + begin + np.arange(len(voxel))
+    table = np.full(int(np.prod(shape)), float(lists))
+    table[voxel] = entry
+    tail = np.zeros(1 + len(chart) + len(voxel))
+    tail[entry - lists] = count
+    tail[np.arange(len(chart)) + np.repeat(np.arange(len(voxel)), count) + 2] = chart
+    header = np.array([*origin, 1 / side, *shape, first, VALID, candidates.wider], dtype=float)
     heights = np.stack([candidates.bounds(k) for k in which])
-    return Cover(graphs, heights, (origin, side, shape), listed)
+    rows = [graphs.centres, graphs.axes.reshape(-1, 9), 1 / graphs.half[:, None], heights]
+    return np.concatenate([header, np.concatenate(rows, axis=1).ravel(), table, tail])

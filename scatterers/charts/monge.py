@@ -26,7 +26,7 @@ import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.cached import cached
-from scatterers.charts.cover import VALID, Cover, Field, MongeCharts, covered_by, probes
+from scatterers.charts.cover import Field, MongeCharts, covered_by, probes
 from scatterers.kernels.compiled import Compiled, call
 from scatterers.kernels.monge import CHART, FIRST, LEAN, OUTSIDE, VOXELS
 
@@ -104,8 +104,7 @@ class MongeAtlas:
         """
         cloud = _checked(cloud)
         for _ in range(ROUNDS):
-            found = covered_by(level, gradient, hessian, cloud, margin)
-            atlas = cls(found.graphs, _flat(found, margin))
+            atlas = cls(*covered_by(level, gradient, hessian, cloud, margin))
             # points of other places than those that the charts were chosen by
             other = probes(level, gradient, cloud, seed=1)
             missed = other[~atlas._holds(other)]
@@ -179,26 +178,3 @@ def _checked(cloud: FloatArray) -> FloatArray:
     if bad := int(np.sum(~np.all(np.isfinite(cloud), axis=-1))):
         raise ValueError(f"{bad} of {len(cloud)} points of the cloud are not finite; leave them out")
     return cloud
-
-
-def _flat(cover: Cover, margin: float) -> FloatArray:
-    """Parameters of an atlas: charts, and the table of voxels."""
-    number = len(cover.graphs.half)
-    origin, side, shape = cover.voxels
-    first = FIRST + CHART * number
-    code = (cover.listed[:, 0] * shape[1] + cover.listed[:, 1]) * shape[2] + cover.listed[:, 2]
-    pairs = np.unique(code * number + cover.listed[:, 3])
-    code, chart = pairs // number, pairs % number
-    voxel, begin, count = np.unique(code, return_index=True, return_counts=True)
-    # behind the table an empty list, then that of each voxel with its length before it
-    lists = first + int(np.prod(shape))
-    entry = lists + 1 + begin + np.arange(len(voxel))
-    table = np.full(int(np.prod(shape)), float(lists))
-    table[voxel] = entry
-    tail = np.zeros(1 + len(chart) + len(voxel))
-    tail[entry - lists] = count
-    tail[np.arange(len(chart)) + np.repeat(np.arange(len(voxel)), count) + 2] = chart
-    header = np.array([*origin, 1 / side, *shape, first, VALID, 1 + margin], dtype=float)
-    graphs = cover.graphs
-    rows = [graphs.centres, graphs.axes.reshape(-1, 9), 1 / graphs.half[:, None], cover.heights]
-    return np.concatenate([header, np.concatenate(rows, axis=1).ravel(), table, tail])

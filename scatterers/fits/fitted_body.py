@@ -1,12 +1,6 @@
-"""Bodies fitted to points: two fits, their difference, and the checks before anything is traced.
+"""Bodies fitted to points: two fits, their difference, and the checks before anything is traced."""
 
-A body of one fit has a spline for each of its smooth pieces, what creeping asks of creases, and the arrays that it is
-stored as; a smooth body is one piece without creases.
-"""
-
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, cast
 
@@ -15,16 +9,13 @@ import numpy as np
 from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.body import Crease, Piece, teller
 from scatterers.charts.level_body import LevelBody
-from scatterers.charts.samples import Samples, towards
+from scatterers.charts.samples import Samples
 from scatterers.charts.star import star_map
 from scatterers.fits import cache as _fit_cache
 from scatterers.fits.cloud import FitReport, PieceCloud, PointCloud
-from scatterers.fits.patch import curved, divided
-from scatterers.fits.pieces import FittedPieces, fitted_pieces
-from scatterers.fits.selection import PieceSpace
+from scatterers.fits.pieces import fitted_pieces
 from scatterers.fits.smooth import good_fit, require_one_body
-from scatterers.fits.tensor import TensorSpline
-from scatterers.kernels.compiled import evaluated
+from scatterers.fits.spline_pieces import SplinePieces, packed, unpacked
 from scatterers.triangles.quality import MeshQuality
 
 if TYPE_CHECKING:
@@ -32,199 +23,7 @@ if TYPE_CHECKING:
     from scatterers.charts.star import CubeSphereAtlas
 
 
-KINDS = ("edge", "joint", "tip", "seam")
-TRUSTED = 1.0
-"""Distance from an edge from which on a fitted piece is trusted, in distances of its points."""
-LEAST = 6
-"""Coefficients along an axis of a spline of degree 5."""
-STEPS, MOVED = 3, 0.1
-"""Newton steps that bring tiles onto their piece, and the longest, in their sides."""
-
-
-@dataclass(frozen=True, eq=False)
-class SplinePieces:
-    """The pieces of a body of one fit; a smooth body is one piece without creases.
-
-    Attributes
-    ----------
-    space : PieceSpace
-    astray : (j, 3), L
-        Points about which the level is not trusted,
-    within : float
-        to this distance, L.
-    creases : tuple of Crease
-    corners, normals : (m, 3, 3), L and 1
-        Triangles of the mesh, outward normals of their pieces; none of a smooth body.
-    number : (m,)
-        Piece of each triangle.
-    reach : (p,), L
-        Distance from its edges within which a piece is not trusted, inf for one that is not trusted at all.
-    """
-
-    space: PieceSpace
-    astray: FloatArray
-    within: float
-    creases: tuple[Crease, ...]
-    corners: FloatArray
-    normals: FloatArray
-    number: IntArray
-    reach: FloatArray
-
-    @classmethod
-    def whole(cls, spline: TensorSpline, astray: FloatArray, within: float) -> "SplinePieces":
-        """A smooth body."""
-        none = np.zeros((0, 3, 3))
-        space = PieceSpace([spline], np.zeros(0))
-        return cls(space, astray, within, (), none, none, np.zeros(0, np.int64), np.zeros(1))
-
-    @classmethod
-    def of(cls, fitted: FittedPieces, corners: FloatArray) -> "SplinePieces":
-        """Those of a fit."""
-        reach = np.array([TRUSTED * patch.spacing for patch in fitted.patches])
-        reach = np.where(fitted.rough, np.inf, reach)
-        within = 1 / fitted.space.table[3]
-        return cls(fitted.space, fitted.astray, within, fitted.creases, corners, fitted.normals, fitted.piece, reach)
-
-    def with_splines(self, splines: Sequence[TensorSpline]) -> "SplinePieces":
-        """The same body by other splines, such as coarser fits."""
-        return replace(self, space=PieceSpace(splines, self.space.table))
-
-    @cached_property
-    def surfaces(self) -> tuple[Piece, ...]:
-        """The pieces."""
-        box = np.stack([self.corners.min(axis=(0, 1)), self.corners.max(axis=(0, 1))])
-        return tuple(Piece(spline.compiled, box) for spline in self.space.splines)
-
-    def tiles(self, edge: float) -> tuple[FloatArray, FloatArray, IntArray]:
-        """The body as triangles with sides of at most ``edge``, L: corners, normals (m, 3, 3) and pieces (m,)."""
-        origin, place = divided(self.corners, edge)
-        points, _ = curved(self.corners[origin, None], self.normals[origin, None], place)
-        normals = np.empty_like(points)
-        number = self.number[origin]
-        for piece in np.unique(number):
-            mine = number == piece
-            x = towards(self.space.splines[piece].compiled, points[mine], STEPS, MOVED * edge)
-            gradient = evaluated(self.space.splines[piece].compiled, x)[1]
-            points[mine], normals[mine] = x, gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)
-        return points, normals, number
-
-    def non_smooth(self, points: FloatArray) -> BoolArray:
-        """Whether points (..., 3), L, lie where F is not trusted: (...)."""
-        given = np.asarray(points, dtype=float)
-        x = given.reshape(-1, 3)
-        found = np.isinf(self.reach)[self.space.numbers(x)]
-        tree, reach = self._edges
-        if len(reach) and x.size:
-            finite = np.all(np.isfinite(x), axis=-1)
-            distance, nearest = tree.query(x[finite], distance_upper_bound=float(reach.max()))
-            near = np.isfinite(distance)
-            near[near] = distance[near] < reach[nearest[near]]
-            found[finite] |= near
-        return np.asarray(found.reshape(given.shape[:-1]))
-
-    @cached_property
-    def _edges(self) -> tuple[Any, FloatArray]:
-        """Tree of points on edges of fitted pieces, and how far from each the pieces are not trusted."""
-        from scipy.spatial import cKDTree
-
-        points, reach = [self.astray], [np.full(len(self.astray), self.within)]
-        for crease in self.creases:
-            sides = self.reach[list(crease.pieces)]
-            own = float(np.max(np.where(np.isfinite(sides), sides, 0.0)))
-            if crease.kind in ("edge", "tip") and own > 0:
-                dense = _dense(crease.points, 0.5 * own)
-                points.append(dense)
-                reach.append(np.full(len(dense), own))
-        return cKDTree(np.concatenate(points)), np.concatenate(reach)
-
-    def arrays(self) -> dict[str, FloatArray]:
-        """All that `restored` needs, but for the splines."""
-        lengths = [len(crease.points) for crease in self.creases]
-        sides = [(KINDS.index(c.kind), *c.pieces, c.angle, n) for c, n in zip(self.creases, lengths, strict=True)]
-        return {
-            "table": self.space.table,
-            "astray": self.astray,
-            "within": np.array([self.within]),
-            "corners": self.corners,
-            "normals": self.normals,
-            "number": self.number.astype(float),
-            "reach": self.reach,
-            "creases": np.array(sides, dtype=float).reshape(-1, 5),
-            "crease-points": np.concatenate([np.zeros((0, 3)), *(crease.points for crease in self.creases)]),
-        }
-
-    @classmethod
-    def restored(cls, arrays: Mapping[str, FloatArray], splines: Sequence[TensorSpline]) -> "SplinePieces":
-        """The pieces whose `arrays` and splines these are.
-
-        Raises
-        ------
-        ValueError, KeyError
-            If arrays are missing or do not fit each other.
-        """
-
-        def get(key: str) -> FloatArray:
-            return np.ascontiguousarray(arrays[key], dtype=float)
-
-        reach, number = get("reach"), cast(IntArray, get("number").astype(np.int64))
-        corners, normals, points, begin = get("corners"), get("normals"), get("crease-points"), 0
-        creases = []
-        for kind, first, second, angle, count in get("creases").tolist():
-            curve = points[begin : begin + int(count)]
-            begin += int(count)
-            creases.append(Crease(KINDS[int(kind)], (int(first), int(second)), curve, angle))
-        space = PieceSpace(tuple(splines), get("table"))
-        if len(space.table) or len(splines) != 1:
-            space.check()
-        if len(reach) != len(splines) or corners.shape != (len(number), 3, 3) or normals.shape != corners.shape:
-            raise ValueError("the triangles of the pieces are damaged")
-        if not np.all((number >= 0) & (number < len(reach))) or not np.all(np.isfinite(corners)):
-            raise ValueError("the triangles of the pieces are damaged")
-        if begin != len(points) or not all(0 <= side < len(reach) for crease in creases for side in crease.pieces):
-            raise ValueError("the creases of the pieces are damaged")
-        astray, within = get("astray").reshape(-1, 3), float(get("within")[0])
-        return cls(space, astray, within, tuple(creases), corners, normals, number, reach)
-
-
-def packed(splines: Sequence[TensorSpline], name: str) -> dict[str, FloatArray]:
-    """Splines as arrays, under names that begin with ``name``."""
-    parts = [(spline.coefficients, np.stack([spline.origin, spline.spacing])) for spline in splines]
-    found = {f"{name}-coefficients-{k}": coefficients for k, (coefficients, _) in enumerate(parts)}
-    return found | {f"{name}-grid-{k}": grid for k, (_, grid) in enumerate(parts)}
-
-
-def unpacked(arrays: Mapping[str, FloatArray], name: str) -> tuple[TensorSpline, ...]:
-    """The splines again.
-
-    Raises
-    ------
-    ValueError, KeyError
-        If an array is missing, or is not of the form that kernels trust.
-    """
-    splines = []
-    for k in range(len(arrays["reach"])):
-        grid, coefficients = arrays[f"{name}-grid-{k}"], arrays[f"{name}-coefficients-{k}"]
-        sound = grid.shape == (2, 3) and coefficients.ndim == 3 and min(coefficients.shape) >= LEAST
-        sound = sound and grid.dtype == coefficients.dtype == float and bool(np.all(np.isfinite(grid)))
-        if not sound or np.any(grid[1] <= 0) or not np.all(np.isfinite(coefficients)):
-            raise ValueError(f"spline {k} of the {name} fit is damaged")
-        splines.append(TensorSpline(np.ascontiguousarray(coefficients), *grid))
-    return tuple(splines)
-
-
-def _dense(points: FloatArray, apart: float) -> FloatArray:
-    """Points (n, 3) of a polygon with others between them, so far apart at most."""
-    length = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    parts = [
-        a + (b - a) * (np.arange(n) / n)[:, None]
-        for a, b, n in zip(points[:-1], points[1:], np.ceil(length / apart).astype(int).clip(1, 1000), strict=True)
-    ]
-    return np.concatenate([*parts, points[-1:]])
-
-
 CHARTS, NO_CHARTS = "charts-", "no_charts"
-FEWEST = 0.1
-"""Share of the points that has to be farther off, for a fit to mean anything."""
 SLACK = 0.02
 """Of the box about a body of pieces, in its largest side."""
 SURFACES = ("smooth", "facets", "auto")
@@ -427,18 +226,10 @@ class FittedBody(SplineBody):
 
 def _fitted(cloud: PointCloud | PieceCloud, progress: Progress) -> tuple[dict[str, FloatArray], dict[str, Any]]:
     """Arrays and text of both fits, checked."""
-    if isinstance(cloud, PieceCloud):
-        fitted = fitted_pieces(cloud.vertices, cloud.triangles, cloud.regions, progress, cloud.normals, cloud.noise)
-        parts = SplinePieces.of(fitted, cloud.vertices[cloud.triangles])
-        coarse, report = [patch.coarse for patch in fitted.patches], fitted.report()
-    else:
-        _require_smooth_points(cloud)
-        found = good_fit(cloud, progress)
-        parts = SplinePieces.whole(found.fine.spline, found.non_smooth, cloud.reach)
-        coarse, report = [found.coarse.spline], found.report
-    arrays = parts.arrays() | packed(parts.space.splines, "fine") | packed(coarse, "coarse")
-    text = {"fit": report.to_json(), "quality": cloud.quality.to_json()}
-    return arrays | {"badness": cloud.quality.badness}, text | cloud.notes
+    found = fitted_pieces(cloud, progress) if isinstance(cloud, PieceCloud) else good_fit(cloud, progress)
+    arrays = packed(found.parts.space.splines, "fine") | packed(found.coarse.space.splines, "coarse")
+    arrays |= found.parts.arrays() | {"badness": cloud.quality.badness}
+    return arrays, {"fit": found.report.to_json(), "quality": cloud.quality.to_json()} | cloud.notes
 
 
 def checked_options(units: Any, strict: Any, cache: Any, progress: Any) -> Progress:
@@ -450,13 +241,3 @@ def checked_options(units: Any, strict: Any, cache: Any, progress: Any) -> Progr
     if not isinstance(cache, (bool, str, Path)):
         raise ValueError(f"cache = {cache!r} is neither True, False nor a folder")
     return teller(progress)
-
-
-def _require_smooth_points(cloud: PointCloud) -> None:
-    """ValueError if hardly a point is left when those about non-smooth places are taken away."""
-    if not len(cloud.non_smooth) or np.mean(cloud.smooth) >= FEWEST:
-        return
-    raise ValueError(
-        f"{np.sum(~cloud.smooth)} of {len(cloud.points)} points lie within {cloud.reach:.3g} m of places where the "
-        "body is not smooth, and nothing is known there; refine the mesh"
-    )

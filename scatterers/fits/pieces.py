@@ -22,13 +22,13 @@ Sources: Derivations, B13.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.body import Crease
-from scatterers.fits.cloud import FitReport, curvatures, differences, rms
+from scatterers.fits.cloud import FitReport, PieceCloud, curvatures, differences, rms
 from scatterers.fits.patch import (
     SLIGHT,
     SPACING,
@@ -42,7 +42,8 @@ from scatterers.fits.patch import (
     tip_of,
 )
 from scatterers.fits.selection import PieceSpace, piece_space, voxel_side
-from scatterers.fits.solver import COARSER, SMOOTHING
+from scatterers.fits.solver import COARSER, SLOPES, SMOOTHING
+from scatterers.fits.spline_pieces import Fit, SplinePieces
 from scatterers.triangles.jets import FEWEST, Jets, angle_weighted_normals, osculating_jets
 from scatterers.triangles.quality import BAD
 from scatterers.triangles.regions import Regions
@@ -72,8 +73,6 @@ ROUGH = 0.05
 """Misfit, in spacings of the points, beyond which nothing of a piece is trusted."""
 FAR_OFF = 0.5
 """Largest distance of its points from F = 0, in their spacings, that a piece may have."""
-SLOPES = (0.5, 1.6)
-"""|grad F| at the points: beyond, nothing of a piece is trusted either."""
 SMALL = 0.02
 """Triangles of a region that may be absorbed, relative to those of the quadric's."""
 
@@ -113,112 +112,69 @@ def rough(patch: Patch, points: FloatArray, size: float) -> bool:
     return bool(np.max(np.abs(value) / slope) > FAR_OFF * patch.spacing)
 
 
-@dataclass(frozen=True, eq=False)
-class FittedPieces:
-    """A body of pieces.
+def fitted_pieces(cloud: PieceCloud, progress: Callable[[str], None]) -> Fit:
+    """Both fits of the pieces of a closed mesh with known regions.
 
-    Attributes
-    ----------
-    space : PieceSpace
-    patches : tuple of Patch
-    piece : (m,)
-        Of each triangle of the mesh.
-    normals : (m, 3, 3)
-        Of the pieces at the corners of the triangles.
-    creases : tuple of Crease
-    rough : (p,) bool
-        Pieces that are not trusted.
-    samples, owner : (k, 3), L, and (k,)
-        Points spread over the body, and their pieces.
-    astray : (j, 3), L
-        Points at which another piece stands for the body, that is not there: features are too fine for the voxels; and
-        vertices at which a fit turns away from the normals of its triangles or faces: it does not follow them.
+    The level is not trusted about points at which another piece stands for the body, that is not there: features are
+    too fine for the voxels; nor at vertices at which a fit turns away from the normals of its triangles or faces: it
+    does not follow them.
     """
-
-    space: PieceSpace
-    patches: tuple[Patch, ...]
-    piece: IntArray
-    normals: FloatArray
-    creases: tuple[Crease, ...]
-    rough: BoolArray
-    samples: FloatArray
-    owner: IntArray
-    astray: FloatArray
-
-    def report(self) -> FitReport:
-        """How well the pieces meet their points, and how their curvatures depend on the grid away from edges."""
-        from scipy.spatial import cKDTree
-
-        edges = [crease.points for crease in self.creases if crease.kind == "edge"]
-        off = cKDTree(np.concatenate(edges)).query(self.samples)[0] if edges else np.full(len(self.samples), np.inf)
-        known = []
-        for k, patch in enumerate(self.patches):
-            points = self.samples[(self.owner == k) & (off > 2 * patch.spacing)]
-            if len(points) and not self.rough[k]:
-                known.append((patch.fine, patch.coarse, points, patch.fine.gradient(points)))
-        fitted = [patch for patch in self.patches if patch.kind == "spline"]
-        spacing = float(np.median([patch.fine.spacing[0] for patch in fitted])) if fitted else 0.0
-        shapes = [patch.fine.coefficients.shape for patch in fitted] or [(6, 6, 6)]
-        return FitReport(
-            points=len(self.samples),
-            spacing=spacing,
-            coarser_spacing=COARSER * spacing,
-            nodes=tuple(n - 4 for n in max(shapes, key=math.prod)),
-            misfit=rms(np.array([0.0, *(patch.misfit for patch in fitted)])),
-            turn=rms(np.array([0.0, *(patch.turn for patch in fitted)])),
-            noise=0.0,
-            smoothing=SMOOTHING,
-            **differences(known),
-        )
-
-
-def fitted_pieces(
-    vertices: FloatArray,
-    triangles: IntArray,
-    regions: Regions,
-    progress: Callable[[str], None],
-    normals: FloatArray | None = None,
-    noise: float = 0.0,
-) -> FittedPieces:
-    """Pieces of a closed mesh (n, 3), L, and (m, 3) with known regions.
-
-    Parameters
-    ----------
-    normals : (m, 3, 3), optional
-        Outward at the corners of the triangles, where they are known; those of the triangles if not.
-    noise : float
-        Of vertices on planes and quadrics, L.
-    """
+    vertices, triangles = cloud.vertices, cloud.triangles
     size = 0.5 * float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    close = Closeness.of(size, noise)
-    regions = absorbed(
-        vertices,
-        triangles,
-        regions,
-        lambda members: polynomial_patch(*_known(vertices, triangles, members, normals)[1:], close),
-        close.most,
-    )
-    piece = _parted(vertices, triangles, regions, normals, close)
+    close = Closeness.of(size, cloud.noise)
+    cloud = absorbed(cloud, close)
+    piece = _parted(cloud, close)
     count = int(piece.max()) + 1
     patches, at_corners, doubted = [], np.empty((len(triangles), 3, 3)), [np.zeros((0, 3))]
     for number in range(count):
         progress(f"piece {number + 1} of {count}")
         own = np.flatnonzero(piece == number)
-        members = _grown(piece, number, regions)
-        patch, corner_normals = _patch(vertices, triangles, members, own, normals, close)
+        members = _grown(piece, number, cloud.regions)
+        patch, corner_normals = _patch(cloud, members, own, close)
         patches.append(patch)
         at_corners[own] = corner_normals
-        local, x, n = _known(vertices, triangles, members, normals)
+        local, x, n = _known(cloud, members)
         # at the border of the members normals are one-sided
         inner = np.unique(local[np.isin(members, own)])
         doubted.append(doubtful(patch, x[inner], n[inner]))
     points, owner = _spread(vertices[triangles], at_corners, piece)
-    creases = tuple(_judged(crease, patches) for crease in regions.creases(vertices, piece))
+    creases = tuple(_judged(crease, patches) for crease in cloud.regions.creases(vertices, piece))
     creases += _tips(vertices, triangles, piece, patches)
     space = piece_space([patch.fine for patch in patches], points, owner, creases)
     lost = np.concatenate([astray(space, patches, points, owner, size), *doubted])
     untrusted = np.array([rough(patch, points[owner == k], size) for k, patch in enumerate(patches)])
-    return FittedPieces(space, tuple(patches), piece, at_corners, creases, untrusted, points, owner, lost)
+    # from an edge on a piece is trusted at the distance of its points
+    reach = np.where(untrusted, np.inf, [patch.spacing for patch in patches])
+    parts = SplinePieces(space, lost, 1 / space.table[3], creases, vertices[triangles], at_corners, piece, reach)
+    coarse = parts.with_splines([patch.coarse for patch in patches])
+    return Fit(parts, coarse, _report(parts, patches, points, owner))
+
+
+def _report(parts: SplinePieces, patches: list[Patch], samples: FloatArray, owner: IntArray) -> FitReport:
+    """How well the pieces meet their points, and how their curvatures depend on the grid away from edges."""
+    from scipy.spatial import cKDTree
+
+    edges = [crease.points for crease in parts.creases if crease.kind == "edge"]
+    off = cKDTree(np.concatenate(edges)).query(samples)[0] if edges else np.full(len(samples), np.inf)
+    known = []
+    for k, patch in enumerate(patches):
+        points = samples[(owner == k) & (off > 2 * patch.spacing)]
+        if len(points) and np.isfinite(parts.reach[k]):
+            known.append((patch.fine, patch.coarse, points, patch.fine.gradient(points)))
+    fitted = [patch for patch in patches if patch.kind == "spline"]
+    spacing = float(np.median([patch.fine.spacing[0] for patch in fitted])) if fitted else 0.0
+    shapes = [patch.fine.coefficients.shape for patch in fitted] or [(6, 6, 6)]
+    return FitReport(
+        points=len(samples),
+        spacing=spacing,
+        coarser_spacing=COARSER * spacing,
+        nodes=tuple(n - 4 for n in max(shapes, key=math.prod)),
+        misfit=rms(np.array([0.0, *(patch.misfit for patch in fitted)])),
+        turn=rms(np.array([0.0, *(patch.turn for patch in fitted)])),
+        noise=0.0,
+        smoothing=SMOOTHING,
+        **differences(known),
+    )
 
 
 def _judged(crease: Crease, patches: list[Patch]) -> Crease:
@@ -270,13 +226,12 @@ def _spread(corners: FloatArray, normals: FloatArray, piece: IntArray) -> tuple[
     return np.concatenate(points), np.concatenate(owner)
 
 
-def _parted(
-    vertices: FloatArray, triangles: IntArray, regions: Regions, normals: FloatArray | None, close: Closeness
-) -> IntArray:
+def _parted(cloud: PieceCloud, close: Closeness) -> IntArray:
     """Piece of each triangle: its region, or a part of one that folds and is no quadric, which has both sides."""
     from scipy.spatial import cKDTree
 
-    corners = vertices[triangles]
+    triangles, regions = cloud.triangles, cloud.regions
+    corners = cloud.vertices[triangles]
     normal, area = flat_normals(corners)
     itself = np.zeros(regions.count, dtype=bool)
     sides = regions.number[regions.turns.sides[regions.crease]]
@@ -292,7 +247,7 @@ def _parted(
             tree = cKDTree(np.einsum("kj,kjc->kc", place.mean(axis=1), corners[own][origin]))
             pairs = own[origin][tree.query_pairs(reach, output_type="ndarray")]
             folds = bool(np.any(np.sum(normal[pairs[:, 0]] * normal[pairs[:, 1]], axis=1) < 0))
-            folds = folds and polynomial_patch(*_known(vertices, triangles, own, normals)[1:], close) is None
+            folds = folds and polynomial_patch(*_known(cloud, own)[1:], close) is None
         if not folds:
             piece[own] = count
             count += 1
@@ -342,17 +297,15 @@ def _spacing(corners: FloatArray) -> float:
     return float(np.median(np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).min(axis=1)))
 
 
-def _known(
-    vertices: FloatArray, triangles: IntArray, members: IntArray, normals: FloatArray | None
-) -> tuple[IntArray, FloatArray, FloatArray]:
+def _known(cloud: PieceCloud, members: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
     """Triangles with these numbers by their own vertices (n, 3), these, and outward normals there."""
-    used, local = np.unique(triangles[members], return_inverse=True)
+    used, local = np.unique(cloud.triangles[members], return_inverse=True)
     local = local.reshape(-1, 3)
-    x = vertices[used]
-    if normals is None:
+    x = cloud.vertices[used]
+    if cloud.normals is None:
         return local, x, angle_weighted_normals(x, local)
     n = np.zeros_like(x)
-    np.add.at(n, local.ravel(), normals[members].reshape(-1, 3))
+    np.add.at(n, local.ravel(), cloud.normals[members].reshape(-1, 3))
     return local, x, n / np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-300)
 
 
@@ -365,26 +318,19 @@ def _corner_normals(patch: Patch, corners: FloatArray) -> FloatArray:
     )
 
 
-def _patch(
-    vertices: FloatArray,
-    triangles: IntArray,
-    members: IntArray,
-    own: IntArray,
-    normals: FloatArray | None,
-    close: Closeness,
-) -> tuple[Patch, FloatArray]:
+def _patch(cloud: PieceCloud, members: IntArray, own: IntArray, close: Closeness) -> tuple[Patch, FloatArray]:
     """F of a piece from its triangles and those next to it, and the normals at the corners of its own."""
-    local, x, n = _known(vertices, triangles, members, normals)
-    corners = x[local]
+    local, x, n = _known(cloud, members)
+    corners, exact = x[local], cloud.normals is not None
     mine = np.isin(members, own)
     polynomial = polynomial_patch(x, n, close)
     if polynomial is not None:
         return polynomial, _corner_normals(polynomial, corners[mine])
     side = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
-    jets = _sound_jets(x, local, n, normals is not None)
+    jets = None if exact else _sound_jets(x, local, n)
     even = float(np.percentile(side, 90)) < 4 * float(np.percentile(side, 10))
-    if (jets is not None or normals is not None) and even and len(x) >= EVEN:
-        n = n if jets is None or normals is not None else jets.normals
+    if (jets is not None or exact) and even and len(x) >= EVEN:
+        n = n if jets is None else jets.normals
         return spline_patch(x, n, float(side.mean()), jets, local), n[local[mine]]
     # known from few vertices: points between them by curved triangles
     area = float(flat_normals(corners)[1].sum())
@@ -397,9 +343,9 @@ def _patch(
     return spline_patch(points, between, edge), n[local[mine]]
 
 
-def _sound_jets(x: FloatArray, triangles: IntArray, normals: FloatArray, exact: bool) -> Jets | None:
+def _sound_jets(x: FloatArray, triangles: IntArray, normals: FloatArray) -> Jets | None:
     """Jets at the vertices of a piece, if most of them are sound."""
-    if exact or len(x) < 2 * FEWEST:
+    if len(x) < 2 * FEWEST:
         return None
     jets = osculating_jets(x, triangles)
     corners = x[triangles]
@@ -410,28 +356,13 @@ def _sound_jets(x: FloatArray, triangles: IntArray, normals: FloatArray, exact: 
     return jets if np.mean(sound) >= GOOD else None
 
 
-def absorbed(
-    vertices: FloatArray,
-    triangles: IntArray,
-    regions: Regions,
-    quadric: Callable[[IntArray], Patch | None],
-    close: float,
-) -> Regions:
-    """Regions without creases that lie within one quadric.
-
-    Parameters
-    ----------
-    vertices, triangles : (n, 3), L, and (m, 3)
-    regions : Regions
-    quadric : callable
-        Plane or quadric through triangles with given numbers, None if there is none.
-    close : float
-        What a vertex on a quadric may be off it, L.
-    """
+def absorbed(cloud: PieceCloud, close: Closeness) -> PieceCloud:
+    """The mesh, its regions without creases that lie within one quadric."""
+    regions = cloud.regions
     number, crease = regions.number.copy(), regions.crease.copy()
     sharp = np.flatnonzero(regions.crease & ~regions.level)
     sides = regions.turns.sides[sharp]
-    corners = vertices[triangles]
+    corners = cloud.vertices[cloud.triangles]
     flat = flat_normals(corners)[0]
     count = np.bincount(number)
     for k in np.argsort(-count).tolist():
@@ -439,13 +370,14 @@ def absorbed(
         beside = np.unique(pair[(pair == k).any(axis=1)])
         small = [j for j in beside.tolist() if j != k and count[j] <= SMALL * count[k]]
         itself = bool(np.any(np.all(pair == k, axis=1)))
-        patch = quadric(np.flatnonzero(number == k)) if itself or small else None
+        members = np.flatnonzero(number == k)
+        patch = polynomial_patch(*_known(cloud, members)[1:], close) if itself or small else None
         if patch is None or patch.kind != "quadric":
             continue
         while small:
             mine = np.flatnonzero(np.isin(number, small))
             own = number[mine]
-            fits = _lies_on(patch, corners[mine], flat[mine], close)
+            fits = _lies_on(patch, corners[mine], flat[mine], close.most)
             good = [j for j in small if np.all(fits[own == j])]
             number[np.isin(number, good)] = k
             pair = number[sides]
@@ -453,9 +385,9 @@ def absorbed(
             small = [j for j in beside.tolist() if j != k and count[j] <= SMALL * count[k]] if good else []
         crease[sharp[np.all(number[sides] == k, axis=1)]] = False
     if np.array_equal(crease, regions.crease):
-        return regions
+        return cloud
     kept = np.unique(number, return_inverse=True)[1].ravel()
-    return replace(regions, number=np.asarray(kept, dtype=np.int64), crease=crease)
+    return replace(cloud, regions=replace(regions, number=np.asarray(kept, dtype=np.int64), crease=crease))
 
 
 def _lies_on(patch: Patch, corners: FloatArray, flat: FloatArray, tolerance: float) -> BoolArray:

@@ -9,7 +9,6 @@ Sources: Derivations, B6.
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -27,9 +26,12 @@ from scatterers.fits.cloud import (
     rms,
     tangents,
 )
-from scatterers.fits.solver import COARSER, MAX_NODES, SMOOTHING, Fitted, fit, spacing_of
+from scatterers.fits.solver import COARSER, MAX_NODES, SLOPES, SMOOTHING, Fitted, fit, spacing_of
+from scatterers.fits.spline_pieces import Fit, SplinePieces
 from scatterers.triangles.subdivision import BLIND, Source, turns, unseen
 
+FEWEST = 0.1
+"""Share of the points that has to be away from places where the body is not smooth, for a fit to mean anything."""
 FINER = 0.75
 """Spacing of the second fit, in units of the first, to points nearer to the source."""
 SMOOTHINGS = (1e-6, 1e-5, 1e-4, 1e-3)
@@ -40,8 +42,6 @@ NORMAL_WEIGHT = 0.1
 """Of the normals of noisy points: from jets they are noisier than the points."""
 SECOND = 0.4
 """Share of noisy points that the second fit sees."""
-SLOPES = (0.5, 1.6)
-"""|grad F| on the body: F is near a signed distance, or the fit has failed."""
 MOST_BLIND = 0.05
 """Share of the vertices of a mesh that is subdivided about which it may show nothing."""
 
@@ -53,24 +53,7 @@ class NoBodyError(ValueError):
     """F = 0 of a fit is not one body, or |grad F| is far from 1 on it; on a narrower grid it may be."""
 
 
-class TwoFits(NamedTuple):
-    """What a cloud comes to.
-
-    Attributes
-    ----------
-    fine, coarse : Fitted
-    report : FitReport
-    non_smooth : (m, 3), L
-        Places about which nothing is known: of the cloud, or what the fit makes blind ones of.
-    """
-
-    fine: Fitted
-    coarse: Fitted
-    report: FitReport
-    non_smooth: FloatArray
-
-
-def good_fit(cloud: PointCloud, progress: Progress) -> TwoFits:
+def good_fit(cloud: PointCloud, progress: Progress) -> Fit:
     """Both fits at the first of the spacings at which they are bodies, and what is known of them.
 
     Raises
@@ -78,6 +61,11 @@ def good_fit(cloud: PointCloud, progress: Progress) -> TwoFits:
     ValueError
         If there is none, or curvatures are too uncertain: on a narrower grid both fits would follow the same noise.
     """
+    if len(cloud.non_smooth) and np.mean(cloud.smooth) < FEWEST:
+        raise ValueError(
+            f"{np.sum(~cloud.smooth)} of {len(cloud.points)} points lie within {cloud.reach:.3g} m of places where the "
+            "body is not smooth, and nothing is known there; refine the mesh"
+        )
     spacings = (cloud.spacing, *cloud.narrower)
     for spacing in spacings[:-1]:
         try:
@@ -87,7 +75,7 @@ def good_fit(cloud: PointCloud, progress: Progress) -> TwoFits:
     return _checked_fit(replace(cloud, spacing=spacings[-1]), progress)
 
 
-def _checked_fit(cloud: PointCloud, progress: Progress) -> TwoFits:
+def _checked_fit(cloud: PointCloud, progress: Progress) -> Fit:
     fine, coarse, smoothing = fits(cloud, progress)
     turn, blind = (np.zeros(0), np.zeros(0, bool)) if cloud.nearer is None else _blind(cloud.nearer.source, fine)
     seen = not len(turn) or np.mean(blind) <= MOST_BLIND
@@ -109,7 +97,8 @@ def _checked_fit(cloud: PointCloud, progress: Progress) -> TwoFits:
             f"the mesh is too coarse: its curvatures are uncertain by {100 * doubt:.0f} %; "
             f"{cloud.quality.reasons}{_remedy(cloud)}"
         )
-    return TwoFits(fine, coarse, report, non_smooth)
+    parts, other = (SplinePieces.whole(one.spline, non_smooth, cloud.reach) for one in (fine, coarse))
+    return Fit(parts, other, report)
 
 
 def _turns(source: Source, fine: Fitted) -> FloatArray:

@@ -54,6 +54,8 @@ AWAY = 1.2
 QUASI = np.array([13, -112, 438, -112, 13]) / 240
 COARSER = 1.35
 """Spacing of the grid of a second fit, in units of the first."""
+SLOPES = (0.5, 1.6)
+"""|grad F| on the body: F is near a signed distance, or the fit has failed."""
 MAX_NODES = 8_000_000
 ITERATIONS = 480
 CHECKED = 20

@@ -10,7 +10,7 @@ from body_checks import rms, shape_operator, unit
 
 import scatterers as sc
 from creeping.geometry.surface import project
-from scatterers.fits.fitted_body import SplinePieces, packed, unpacked
+from scatterers.fits.spline_pieces import SplinePieces, packed, unpacked
 
 R, TUBE = 1.0, 0.4
 
