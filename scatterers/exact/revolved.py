@@ -30,9 +30,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from creeping._typing import FloatArray, IntArray
-from scatterers.body import SHARP, Crease, NoCharts, Piece, PiecewiseBody, positive
+from scatterers.body import SHARP, Body, Crease, Levelled, NoCharts, Piece, no_charts, positive
 from scatterers.exact.profile import Segment
-from scatterers.kernels.compiled import Compiled
+from scatterers.kernels.compiled import Compiled, evaluated
 from scatterers.kernels.revolved import ROWS, SPLINE, WIDTH, evaluate, numbers
 from scatterers.kernels.tensor import HEADER
 
@@ -136,7 +136,7 @@ def _cuts(segment: Segment) -> FloatArray:
     return np.concatenate([[0.0], inner, [1.0]])
 
 
-class Revolved(PiecewiseBody):
+class Revolved(Levelled, Body):
     """Base of bodies with a profile; a subclass gives ``_profile``, and where it is placed."""
 
     # the axes of space that are u, v and w, and v over that coordinate
@@ -212,9 +212,10 @@ class Revolved(PiecewiseBody):
         """Compiled level evaluator."""
         return Compiled(evaluate, "level", self._packed(self._profile))
 
-    @cached_property
-    def _compiled_numbers(self) -> Compiled:
-        return Compiled(numbers, "level", self.compiled.parameters)
+    def piece(self, points: FloatArray) -> IntArray:
+        """Number of the piece nearest to points (..., 3), L, which lie near the body: (...)."""
+        # this level has the numbers of the pieces in the place of F
+        return evaluated(Compiled(numbers, "level", self.compiled.parameters), points)[0].astype(np.int64)
 
     @cached
     def creases(self) -> Sequence[Crease]:
@@ -309,9 +310,9 @@ class Revolved(PiecewiseBody):
     @cached
     def atlas(self) -> "CubeSphereAtlas | NoCharts":
         """Six charts of a body that has neither edges nor tips and is seen whole from the middle of its box."""
-        if any(crease.kind in SHARP for crease in self.creases) or self._axes != (0, 1, 2) or self._stretch != 1:
-            return NoCharts(super().atlas.reason)
-
+        sharp = [crease for crease in self.creases if crease.kind in SHARP]
+        if sharp or self._axes != (0, 1, 2) or self._stretch != 1:
+            return no_charts(sharp)
         return charts(self.bounds, self.tiles, lambda of_map: self._packed(self._profile, of_map))
 
 

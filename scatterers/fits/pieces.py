@@ -234,7 +234,7 @@ def _parted(cloud: PieceCloud, close: Closeness) -> IntArray:
     corners = cloud.vertices[triangles]
     normal, area = flat_normals(corners)
     itself = np.zeros(regions.count, dtype=bool)
-    sides = regions.number[regions.turns.sides[regions.crease]]
+    sides = regions.number[regions.sides[regions.crease]]
     itself[sides[sides[:, 0] == sides[:, 1], 0]] = True
     piece = np.zeros(len(triangles), dtype=np.int64)
     count = 0
@@ -361,7 +361,7 @@ def absorbed(cloud: PieceCloud, close: Closeness) -> PieceCloud:
     regions = cloud.regions
     number, crease = regions.number.copy(), regions.crease.copy()
     sharp = np.flatnonzero(regions.crease & ~regions.level)
-    sides = regions.turns.sides[sharp]
+    sides = regions.sides[sharp]
     corners = cloud.vertices[cloud.triangles]
     flat = flat_normals(corners)[0]
     count = np.bincount(number)

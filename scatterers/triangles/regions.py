@@ -35,7 +35,10 @@ class Regions:
     ----------
     number : (m,)
         Region of each triangle.
-    turns : Turns
+    ends, sides : (e, 2)
+        Vertices and triangles of each edge.
+    turn : (e,)
+        Angle across it, degrees, < 0 if concave.
     crease : (e,) bool
         Which edges bound regions.
     level : (e,) bool
@@ -43,7 +46,9 @@ class Regions:
     """
 
     number: IntArray
-    turns: "Turns"
+    ends: IntArray
+    sides: IntArray
+    turn: FloatArray
     crease: BoolArray
     level: BoolArray
 
@@ -55,27 +60,18 @@ class Regions:
     @cached_property
     def joined(self) -> IntArray:
         """Pairs of triangles (k, 2) that are neighbours across an edge that is no crease."""
-        return np.asarray(self.turns.sides[~self.crease])
+        return np.asarray(self.sides[~self.crease])
 
     def creases(self, vertices: FloatArray, piece: IntArray) -> tuple[Crease, ...]:
         """Edges, joints, and seams between pieces (m,) of triangles of one region, as curves."""
-        sides = piece[self.turns.sides]
+        sides = piece[self.sides]
         seam = ~self.crease & (sides[:, 0] != sides[:, 1])
         found: tuple[Crease, ...] = ()
         for kind, which in (("edge", self.crease & ~self.level), ("joint", self.level), ("seam", seam)):
-            turns = np.radians(np.abs(self.turns.turn[which])) * (kind == "edge")
-            for pair, chain, edges in curves(self.turns.ends[which], sides[which], len(vertices)):
+            turns = np.radians(np.abs(self.turn[which])) * (kind == "edge")
+            for pair, chain, edges in curves(self.ends[which], sides[which], len(vertices)):
                 found += (Crease(kind, pair, vertices[chain], float(np.max(turns[edges]))),)
         return found
-
-
-@dataclass(frozen=True, eq=False)
-class Turns:
-    """Edges (e, 2) of a closed mesh, their triangles (e, 2), and the turn across them (e,), degrees, < 0 if concave."""
-
-    ends: IntArray
-    sides: IntArray
-    turn: FloatArray
 
 
 def regions_of(
@@ -102,14 +98,15 @@ def regions_of(
     >>> found.count, [crease.closed for crease in found.creases(rod.vertices, found.number)]
     (3, [True, True])
     """
-    turns = _turns(vertices, triangles)
-    crease = _chained(turns, _piecewise(turns, len(triangles)) if sharp is None else sharp, len(vertices))
+    ends, sides, turn = _turns(vertices, triangles)
+    crease = _chained(ends, turn, _piecewise(sides, turn, len(triangles)) if sharp is None else sharp, len(vertices))
     level = np.zeros_like(crease) if level is None else level & ~crease
     bounds = crease | level
-    return Regions(_connected(len(triangles), turns.sides[~bounds]), turns, bounds, level)
+    return Regions(_connected(len(triangles), sides[~bounds]), ends, sides, turn, bounds, level)
 
 
-def _turns(vertices: FloatArray, triangles: IntArray) -> Turns:
+def _turns(vertices: FloatArray, triangles: IntArray) -> tuple[IntArray, IntArray, FloatArray]:
+    """Ends (e, 2), triangles (e, 2) and the turn (e,) of the edges of a closed mesh."""
     edges = edges_of(triangles)
     # both corners of each edge, that of the triangle that runs forward along it first
     order = np.lexsort((~edges.forward, edges.number)).reshape(-1, 2)
@@ -124,16 +121,16 @@ def _turns(vertices: FloatArray, triangles: IntArray) -> Turns:
     thin = np.minimum(area[sides[:, 0]], area[sides[:, 1]]) < SLIVER * np.median(area) * (
         np.linalg.norm(along, axis=1) / np.sqrt(2 * np.median(area))
     ).clip(None, 1.0)
-    return Turns(edges.ends, sides, np.where(thin & (np.abs(turn) < ALWAYS), 0.0, turn))
+    return edges.ends, sides, np.where(thin & (np.abs(turn) < ALWAYS), 0.0, turn)
 
 
-def _piecewise(turns: Turns, count: int) -> BoolArray:
+def _piecewise(sides: IntArray, turn: FloatArray, count: int) -> BoolArray:
     """Edges at which no smooth surface goes through the triangles."""
-    size = np.abs(turns.turn)
+    size = np.abs(turn)
     sharp = ((size > SHARP) & (size > 3 * np.median(size))) | (size > ALWAYS)
-    facet = _connected(count, turns.sides[size < FLAT])
+    facet = _connected(count, sides[size < FLAT])
     # pairs of neighbouring facets, with the turn between them where it may be that of a round surface
-    pair = np.sort(facet[turns.sides], axis=1)
+    pair = np.sort(facet[sides], axis=1)
     other = (pair[:, 0] != pair[:, 1]) & ~sharp
     found, inverse = np.unique(pair[other], axis=0, return_inverse=True)
     between = np.zeros(len(found))
@@ -150,21 +147,21 @@ def _piecewise(turns: Turns, count: int) -> BoolArray:
             elif turn > second[mine] and theirs != partner[mine]:
                 second[mine] = turn
     mine = np.flatnonzero((size > max(TURN, OFTEN * float(np.median(size)))) & ~sharp)
-    ends = facet[turns.sides[mine]]
+    ends = facet[sides[mine]]
     besides = np.where(partner[ends] == ends[:, ::-1], second[ends], first[ends])
     alone = np.all(besides < ALIKE * size[mine, None], axis=1)
     sharp[mine[alone]] = True
     return np.asarray(sharp)
 
 
-def _chained(turns: Turns, crease: BoolArray, count: int) -> BoolArray:
+def _chained(ends: IntArray, turn: FloatArray, crease: BoolArray, count: int) -> BoolArray:
     """Creases without those of chains of fewer edges than `FEWEST`."""
     at = np.flatnonzero(crease)
     if not len(at):
         return crease
-    label = _connected(count, turns.ends[at])[turns.ends[at, 0]]
+    label = _connected(count, ends[at])[ends[at, 0]]
     count_of = np.bincount(label)
-    always = np.bincount(label, np.abs(turns.turn[at]) > ALWAYS) == count_of
+    always = np.bincount(label, np.abs(turn[at]) > ALWAYS) == count_of
     enough = ((count_of >= FEWEST) | (always & (count_of >= 3)))[label]
     kept = np.zeros_like(crease)
     kept[at[enough]] = True
