@@ -109,10 +109,8 @@ LEAST, FACING, VALID = 0.2, 0.45, 0.4
 BENT = 0.9
 # distance of candidates, in radii of curvature, and the largest, in diagonals of the body's box
 APART, FARTHEST = 0.25, 0.1
-# frames of candidates about one point, the first along the principal directions
-TURNS = 2
-# how much a chart that meets another sheet, or has no height, is shrunk, and how many times
-SHRINK, SHRINKS = 0.93, 8
+# how much a chart that meets another sheet, or has no height, is shrunk
+SHRINK = 0.85
 ROUNDS = 12
 
 
@@ -183,12 +181,10 @@ class _Cloud:
         first, neighbours = rows.indptr.astype(np.int64), rows.indices.astype(np.int64)
         return cls(level, gradient, points, axes, curvatures, gap, tree, first, neighbours)
 
-    def graphs(self, start: IntArray, axes: FloatArray, half: FloatArray) -> MongeCharts:
+    def graphs(self, start: IntArray, half: FloatArray) -> MongeCharts:
         """Charts about points of the cloud."""
-        # the principal frame in the chart's
-        turn = np.einsum("nij,nkj->nik", axes[:, :2], self.axes[start, :2])
-        bend = -np.einsum("nij,nj,nkj->nik", turn, self.curvatures[start], turn)
-        return MongeCharts(self.level, self.gradient, self.points[start], axes, half, bend)
+        bend = -self.curvatures[start][:, :, None] * np.eye(2)
+        return MongeCharts(self.level, self.gradient, self.points[start], self.axes[start], half, bend)
 
     @property
     def bent(self) -> FloatArray:
@@ -222,56 +218,46 @@ def _principal(gradient: FloatArray, hessian: FloatArray) -> tuple[FloatArray, F
     f = np.cross(n, e)
     a, b, c = (np.einsum("ni,nij,nj->n", p, hessian, q) / size for p, q in ((e, e), (e, f), (f, f)))
     angle = 0.5 * np.arctan2(2 * b, a - c)
-    axes = np.stack([e, f, n], axis=1)
-    axes = _turned(axes, angle)
+    cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    axes = np.stack([cos * e + sin * f, cos * f - sin * e, n], axis=1)
     middle, spread = 0.5 * (a + c), np.hypot(0.5 * (a - c), b)
     return axes, np.stack([middle + spread, middle - spread], axis=-1)
 
 
-def _turned(axes: FloatArray, angle: FloatArray) -> FloatArray:
-    """Frames turned about N."""
-    cos, sin = np.cos(angle), np.sin(angle)
-    out = axes.copy()
-    out[:, 0] = np.transpose(cos * axes[:, 0].T + sin * axes[:, 1].T)
-    out[:, 1] = np.transpose(cos * axes[:, 1].T - sin * axes[:, 0].T)
-    return out
-
-
 class _Candidates:
-    """Charts to choose from: number of the centre, frame, half width, covered points, bounds of the heights."""
+    """Charts to choose from: number of the centre, half width, covered points, bounds of the heights.
+
+    Their axes are the principal directions at the centre.
+    """
 
     def __init__(self, cloud: _Cloud, margin: float) -> None:
         self.cloud, self.wider = cloud, 1 + margin
         self.start = np.zeros(0, dtype=np.int64)
-        self.angle, self.axes = np.zeros(0), np.zeros((0, 3, 3))
         self.half, self.heights = np.zeros(0), np.zeros((0, 2))
         self.covered: list[IntArray] = []
 
-    def add(self, start: IntArray, angle: FloatArray, longest: FloatArray) -> None:
-        """Charts about points of the cloud, frames turned by angles, half widths ``longest`` at most."""
+    def add(self, start: IntArray, longest: FloatArray) -> None:
+        """Charts about points of the cloud, half widths ``longest`` at most."""
         from scatterers.kernels.monge import grow
 
         cloud = self.cloud
         normals = np.ascontiguousarray(cloud.axes[:, 2])
         graph = cloud.points, normals, cloud.bent, cloud.first, cloud.neighbours, cloud.gap
-        for attempt in range(SHRINKS):
-            if not len(start):
-                return
-            axes = np.ascontiguousarray(_turned(cloud.axes[start], angle))
+        while len(start):
+            axes = np.ascontiguousarray(cloud.axes[start])
             half, begin, covered, heights = grow(
                 start, axes, longest * self.wider, *graph, LEAST, FACING, BENT * self.wider, self.wider
             )
             lists = np.split(covered, begin[1:-1])
             # corners are where a point of the cloud may be too far to tell
-            torn = self._torn(cloud.graphs(start, axes, half), 2)
-            good = ~torn if attempt < SHRINKS - 1 else np.ones(len(start), dtype=bool)
+            torn = self._torn(cloud.graphs(start, half), 2)
+            # one that is no wider than the gaps covers nothing
+            good = ~torn | (half < cloud.gap[start])
             self.start = np.concatenate([self.start, start[good]])
-            self.axes = np.concatenate([self.axes, axes[good]])
-            self.angle = np.concatenate([self.angle, angle[good]])
             self.half = np.concatenate([self.half, half[good]])
             self.heights = np.concatenate([self.heights, heights[good]])
             self.covered += [lists[k] if not torn[k] else lists[k][:0] for k in np.flatnonzero(good)]
-            start, angle, longest = start[~good], angle[~good], SHRINK * half[~good]
+            start, longest = start[~good], SHRINK * half[~good]
 
     def _torn(self, graphs: MongeCharts, side: int) -> BoolArray:
         """Charts over whose widened squares, tried at side x side points, there is no graph."""
@@ -320,12 +306,14 @@ class _Candidates:
     def valid(self, k: int) -> tuple[IntArray, FloatArray]:
         """Points of the cloud that would take the chart for theirs, and their max(|2u - 1|, |2v - 1|)."""
         cloud, low_high = self.cloud, self.bounds(k)
-        centre, n = cloud.points[self.start[k]], self.axes[k, 2]
+        centre, axes = cloud.points[self.start[k]], cloud.axes[self.start[k]]
         radius = np.sqrt(2 * self.half[k] ** 2 + np.max(low_high**2))
         near = np.array(cloud.tree.query_ball_point(centre, radius), dtype=np.int64)
-        q = (cloud.points[near] - centre) @ self.axes[k].T
+        q = (cloud.points[near] - centre) @ axes.T
         rho = np.max(np.abs(q[:, :2]), axis=-1) / self.half[k]
-        good = (rho <= 1) & (cloud.axes[near, 2] @ n >= VALID) & (q[:, 2] >= low_high[0]) & (q[:, 2] <= low_high[1])
+        good = (
+            (rho <= 1) & (cloud.axes[near, 2] @ axes[2] >= VALID) & (q[:, 2] >= low_high[0]) & (q[:, 2] <= low_high[1])
+        )
         return near[good], rho[good]
 
     def failing(self, graphs: MongeCharts, which: list[int]) -> list[int]:
@@ -354,13 +342,12 @@ def covered_by(
     candidates = _Candidates(cloud, margin)
     fresh, before = cloud.spread(np.arange(len(points)), APART), len(points)
     for _ in range(ROUNDS):
-        for angle in np.pi / 2 * np.arange(TURNS) / TURNS:
-            candidates.add(fresh, np.full(len(fresh), angle), np.full(len(fresh), np.inf))
+        candidates.add(fresh, np.full(len(fresh), np.inf))
         which = candidates.chosen()
-        graphs = cloud.graphs(candidates.start[which], candidates.axes[which], candidates.half[which])
+        graphs = cloud.graphs(candidates.start[which], candidates.half[which])
         bad = candidates.failing(graphs, which)
         if bad:
-            candidates.add(candidates.start[bad], candidates.angle[bad], SHRINK**4 * candidates.half[bad])
+            candidates.add(candidates.start[bad], SHRINK * candidates.half[bad])
             for k in bad:
                 candidates.covered[k] = candidates.covered[k][:0]
         missed = np.ones(len(points), dtype=bool)
