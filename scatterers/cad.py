@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from scatterers.body import teller
 from scatterers.fits.cache import key_of
 from scatterers.fits.cloud import PieceCloud, PointCloud
-from scatterers.fits.fitted_body import FittedBody, checked_options
+from scatterers.fits.fitted_body import FittedBody
 from scatterers.triangles.cad_file import CadPoints, CadReading, kind_of, read_cad
 from scatterers.triangles.jets import osculating_jets, signed_distance
 from scatterers.triangles.quality import Choice, MeshQuality, assess
@@ -107,7 +108,7 @@ class Cad(FittedBody):
         if isinstance(points, bool) or not isinstance(points, (int, np.integer)) or not 500 <= points <= 200_000:
             raise ValueError(f"points = {points!r}; give a whole number from 500 to 200000")
         points = int(points)
-        report = checked_options(units, strict, cache, progress)
+        report = teller(progress)
         try:
             # before all of it is read
             kind_of(Path(path))

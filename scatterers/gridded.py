@@ -6,14 +6,13 @@ Sources: [B78]; Derivations, B7.
 """
 
 import hashlib
-import reprlib
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from creeping._typing import ArrayLike, FloatArray
-from scatterers.body import box_of, numbers, numbers_of
+from scatterers.body import box_of, numbers, numbers_of, positive
 from scatterers.charts.level_body import LevelBody
 from scatterers.charts.samples import Samples
 from scatterers.charts.star import star_map
@@ -112,15 +111,10 @@ class Gridded(LevelBody):
         >>> float(abs(body.level([0.0, 0.8, 0.0])).round(9))
         0.0
         """
-        if not all(hasattr(body, name) for name in ("level", "bounds")) or isinstance(body, type):
-            raise ValueError(f"{reprlib.repr(body)} is no body: it needs level and bounds")
-        counts = [nodes] * 3 if isinstance(nodes, int) else list(nodes) if isinstance(nodes, (list, tuple)) else []
-        if len(counts) != 3 or any(
-            isinstance(n, bool) or not isinstance(n, int) or not FEWEST <= n <= MOST for n in counts
-        ):
+        counts = np.broadcast_to(nodes, 3).tolist()
+        if not all(FEWEST <= n <= MOST for n in counts):
             raise ValueError(f"nodes = {nodes!r}; give one or three whole numbers from {FEWEST} to {MOST}")
-        if isinstance(margin, bool) or not isinstance(margin, (int, float)) or not 0 < margin <= 1e9:
-            raise ValueError(f"margin = {margin!r} is not a positive finite number; give e.g. 0.15")
+        positive(margin=margin)
         box = numbers_of("bounds", body.bounds, (2, 3))
         widened = margin * 0.5 * (box[1] - box[0])
         box = np.stack([box[0] - widened, box[1] + widened])

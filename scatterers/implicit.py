@@ -90,8 +90,6 @@ class Implicit(LevelBody):
         strict: bool = False,
         speed: Any = None,
     ) -> None:
-        if not isinstance(strict, bool):
-            raise ValueError(f"strict = {strict!r} is neither True nor False")
         expression = one_sided(expression)
         everywhere = ExpressionSpace(expression, np.array([[-SIZES[-1]] * 3, [SIZES[-1]] * 3]))
         self.expression = expression

@@ -16,9 +16,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from scatterers.body import teller
 from scatterers.fits.cache import key_of
 from scatterers.fits.cloud import DISTRUSTED, Nearer, PieceCloud, PointCloud
-from scatterers.fits.fitted_body import FittedBody, checked_options
+from scatterers.fits.fitted_body import FittedBody
 from scatterers.fits.joints import Jointed, jointed
 from scatterers.fits.solver import spacing_of
 from scatterers.triangles.files import TriangleMesh, mesh_bytes, read_mesh
@@ -127,7 +128,7 @@ class Mesh(FittedBody):
         if surface == "auto":
             # made already
             return
-        report = checked_options(units, strict, cache, progress)
+        report = teller(progress)
         in_memory = hasattr(source, "vertices") and hasattr(source, "faces")
         if in_memory and units is None and getattr(source, "units", None) is None:
             self.unit = "L"

@@ -50,16 +50,8 @@ def body_cloud(level: Field, gradient: Field, box: FloatArray, count: int) -> Fl
     longest = 0.4 * float(side.min())
     spacing = min(float(np.prod(side)) ** (1 / 3) / COARSE, longest)
     for _ in range(4):
-        if np.prod(side / spacing + 4) > MOST:
-            raise ValueError(
-                f"{count} points ask for a grid of more than {MOST} nodes; ask for fewer, or a smaller box"
-            )
-        # the shift keeps nodes off planes of symmetry, where F is often exactly 0
-        origin = box[0] - (1 + 0.1 * np.sqrt([2.0, 3.0, 5.0])) * spacing
-        axes = [origin[k] + spacing * np.arange(int(side[k] / spacing) + 4) for k in range(3)]
-        # plane by plane, so that large grids do not fill the memory
-        planes = [level(np.stack(np.broadcast_arrays(x, axes[1][:, None], axes[2]), axis=-1)) for x in axes[0]]
-        points = sign_changes(np.stack(planes), origin, np.full(3, spacing))
+        samples = sampled(level, box, spacing)
+        points = sign_changes(samples.values, samples.origin, samples.spacing)
         if not len(points):
             raise ValueError("F has no sign change in its box: no body; check the box and F")
         if 0.9 * count < len(points) < 1.1 * count:
@@ -172,6 +164,28 @@ class Samples:
     def crossings(self) -> FloatArray:
         """Points (n, 3), L, where edges of the grid cross the body, by linear interpolation."""
         return np.asarray(self.origin + edge_crossings(self.values) * self.spacing)
+
+
+def sampled(level: Field, box: FloatArray, spacing: float) -> Samples:
+    """F on a cubic grid about a box (2, 3), L.
+
+    Raises
+    ------
+    ValueError
+        If it would have more than `MOST` nodes.
+    """
+    side = box[1] - box[0]
+    if np.prod(side / spacing + 4) > MOST:
+        raise ValueError(
+            f"a spacing of {spacing:.3g} L asks for a grid of more than {MOST} nodes; give a larger one: "
+            "larger tiles, fewer points, or a smaller box"
+        )
+    # the shift keeps nodes off planes of symmetry, where F is often exactly 0
+    origin = box[0] - (1 + 0.1 * np.sqrt([2.0, 3.0, 5.0])) * spacing
+    axes = [origin[k] + spacing * np.arange(int(side[k] / spacing) + 4) for k in range(3)]
+    # plane by plane, so that large grids do not fill the memory
+    planes = [level(np.stack(np.broadcast_arrays(x, axes[1][:, None], axes[2]), axis=-1)) for x in axes[0]]
+    return Samples(np.stack(planes), origin, np.full(3, spacing))
 
 
 def edge_crossings(values: FloatArray) -> FloatArray:

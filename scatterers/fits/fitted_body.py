@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Self, cast
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
-from scatterers.body import Crease, Piece, teller
+from scatterers.body import Crease, Piece
 from scatterers.charts.level_body import LevelBody
 from scatterers.charts.samples import Samples
 from scatterers.charts.star import star_map
@@ -169,7 +169,7 @@ class FittedBody(SplineBody):
         self.speed = speed
         # before the fit: it may take minutes
         self._set_speed()
-        folder = _fit_cache.cache_folder() if cache is True else Path(str(cache)) if cache else None
+        folder = _fit_cache.cache_folder() if cache is True else Path(cache) if cache else None
         found = None if folder is None else _fit_cache.load(folder, key)
         if found is not None:
             try:
@@ -230,14 +230,3 @@ def _fitted(cloud: PointCloud | PieceCloud, progress: Progress) -> tuple[dict[st
     arrays = packed(found.parts.space.splines, "fine") | packed(found.coarse.space.splines, "coarse")
     arrays |= found.parts.arrays() | {"badness": cloud.quality.badness}
     return arrays, {"fit": found.report.to_json(), "quality": cloud.quality.to_json()} | cloud.notes
-
-
-def checked_options(units: Any, strict: Any, cache: Any, progress: Any) -> Progress:
-    """What to call with progress; ValueError or TypeError on options that are none."""
-    if units is not None and not isinstance(units, str):
-        raise ValueError(f'units = {units!r} is no text; give e.g. units="mm"')
-    if not isinstance(strict, bool):
-        raise ValueError(f"strict = {strict!r} is neither True nor False")
-    if not isinstance(cache, (bool, str, Path)):
-        raise ValueError(f"cache = {cache!r} is neither True, False nor a folder")
-    return teller(progress)

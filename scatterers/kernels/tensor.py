@@ -360,7 +360,7 @@ TABLES = 9
 
 
 @njit(**OPTIONS)
-def _place(x, origin, per_side, count):  # type: ignore[no-untyped-def]
+def voxel_place(x, origin, per_side, count):  # type: ignore[no-untyped-def]
     """Voxel along one axis, the nearest for a point outside."""
     # comparisons with NaN are false, so a NaN lands in voxel 0 and no undefined cast is made
     g = (x - origin) * per_side
@@ -371,9 +371,9 @@ def _place(x, origin, per_side, count):  # type: ignore[no-untyped-def]
 @njit(**OPTIONS)
 def chosen(x, y, z, parameters):  # type: ignore[no-untyped-def]
     """Number of the piece whose F is that of the body at a point."""
-    cell = _place(x, parameters[0], parameters[3], parameters[4])
-    cell = cell * int(parameters[5]) + _place(y, parameters[1], parameters[3], parameters[5])
-    cell = cell * int(parameters[6]) + _place(z, parameters[2], parameters[3], parameters[6])
+    cell = voxel_place(x, parameters[0], parameters[3], parameters[4])
+    cell = cell * int(parameters[5]) + voxel_place(y, parameters[1], parameters[3], parameters[5])
+    cell = cell * int(parameters[6]) + voxel_place(z, parameters[2], parameters[3], parameters[6])
     entry = int(parameters[int(parameters[7]) + cell])
     length, number = int(parameters[entry]), int(parameters[entry + 1])
     if length == 1:

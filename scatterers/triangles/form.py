@@ -17,6 +17,7 @@ import numpy as np
 
 from creeping._typing import FloatArray, IntArray
 from scatterers.triangles.parts import areas, capped, compact, parts_of, taken_apart
+from scatterers.triangles.quality import silent
 from scatterers.triangles.topology import KEPT, crossings, edges_of, oriented
 
 PLY_BYTES = {
@@ -250,20 +251,16 @@ def _closed(
     name: str, vertices: FloatArray, triangles: IntArray, largest: float, scale: float
 ) -> tuple[FloatArray, IntArray] | None:
     """The largest part with its holes closed, None if it is not closed then."""
-    x, t = taken_apart(name, vertices, triangles, _silent)
+    x, t = taken_apart(name, vertices, triangles, silent)
     part = parts_of(x, t)
     size = areas(x, t)
     if float(size[part > 0].sum()) > MOST_CUT * float(size.sum()):
         return None
     x, t = compact(x, t[part == 0])
-    x, t = capped(name, x, t, largest, scale, _silent)
+    x, t = capped(name, x, t, largest, scale, silent)
     if np.any(edges_of(t).faces != 2):
         return None
     try:
-        return x, oriented(name, x, t, _silent)
+        return x, oriented(name, x, t, silent)
     except ValueError:
         return None
-
-
-def _silent(_: str) -> None:
-    """Note of what is told as a whole."""

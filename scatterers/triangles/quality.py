@@ -31,7 +31,7 @@ import numpy as np
 from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.triangles.jets import Jets, angle_weighted_normals
 from scatterers.triangles.parts import capped, chosen_part, taken_apart, united
-from scatterers.triangles.topology import cleaned, oriented
+from scatterers.triangles.topology import cleaned, edges_of, flat_normals, oriented
 
 BAD = 0.03
 ASTRAY = 0.5
@@ -281,15 +281,13 @@ def _rims(ends: IntArray, angles: FloatArray, count: int) -> int:
 
 def _dihedrals(vertices: FloatArray, triangles: IntArray) -> tuple[IntArray, FloatArray]:
     """Edges (k, 2) and the angles between their triangles (k,), degrees; small ones are left out."""
-    corners = vertices[triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    first, last = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    order = np.lexsort((np.maximum(first, last), np.minimum(first, last))).reshape(-1, 2)
-    left, right = normal[order[:, 0] // 3], normal[order[:, 1] // 3]
-    angle = np.arctan2(np.linalg.norm(np.cross(left, right), axis=1), np.sum(left * right, axis=1))
-    area = np.minimum(np.linalg.norm(left, axis=1), np.linalg.norm(right, axis=1))
-    solid = area > SLIVER * np.median(np.linalg.norm(normal, axis=1))
-    return np.stack([first, last], axis=1)[order[solid, 0]], np.degrees(angle[solid])
+    edges = edges_of(triangles)
+    normal, area = flat_normals(vertices[triangles])
+    left, right = edges.sides.T // 3
+    across = np.linalg.norm(np.cross(normal[left], normal[right]), axis=1)
+    angle = np.arctan2(across, np.sum(normal[left] * normal[right], axis=1))
+    solid = np.minimum(area[left], area[right]) > SLIVER * np.median(area)
+    return edges.ends[solid], np.degrees(angle[solid])
 
 
 @dataclass(frozen=True)
@@ -322,8 +320,6 @@ class Choice:
             raise ValueError(f'part = {part!r}; give "largest", a number from 1, or a name of the file')
         if cap is not None and (isinstance(cap, bool) or not isinstance(cap, (int, float)) or not cap > 0):
             raise ValueError(f"cap = {cap!r} is no size in m; give that of the largest hole to be closed, inf for all")
-        if not isinstance(self.union, bool):
-            raise ValueError(f"union = {self.union!r} is neither True nor False")
         if isinstance(times, bool) or times not in (None, "auto", 1, 2, 3):
             raise ValueError(f'subdivide = {times!r}; give 1, 2 or 3 times, or "auto"')
 
