@@ -1,4 +1,7 @@
-"""Choice of Monge charts that cover a body, by lazy greedy set cover over a cloud of its points.
+"""Monge charts (see `scatterers.charts.monge`), and a choice of them that covers a body, by lazy greedy set cover.
+
+h is followed from the centre of the square: over s q, s in STEPS, Newton steps h <- h - F/(g.N) start from the Taylor
+series of the place before, dh/ds = -(g.q)/(g.N). Charts are chosen over a cloud of points of the body.
 
 With S the shape operator P H P/|grad F| and kappa the larger |eigenvalue|, a chart about a point of the cloud is as
 wide as n.N >= LEAST and w max(kappa) <= BENT allow on its square widened by the margin. It covers the points with

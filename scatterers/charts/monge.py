@@ -5,9 +5,6 @@ With x0 on the body, N = n(x0), E1 and E2 tangent, E1 x E2 = N, w the half width
     x(u, v) = x0 + q + h N,   q = w ((2u - 1) E1 + (2v - 1) E2),   F(x(u, v)) = 0,
     x_u = 2w (E1 - N (g.E1)/(g.N)),   x_v = 2w (E2 - N (g.E2)/(g.N)).
 
-h is followed from the centre of the square: over s q, s in STEPS, Newton steps h <- h - F/(g.N) start from the Taylor
-series of the place before, dh/ds = -(g.q)/(g.N).
-
 A point belongs to the chart for which max(|2u - 1|, |2v - 1|) is least, (2u - 1, 2v - 1) = (E1, E2).(x - x0)/w, among
 those listed for its voxel with n.N >= VALID and the height within bounds. The polar frame of such a chart is the
 least rotation that takes N to n,

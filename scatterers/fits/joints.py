@@ -1,8 +1,7 @@
 """Joints in a mesh: curves where the curvature jumps while the normal does not, found between planes and quadrics.
 
-Planes and quadrics Q_k = 0 are found first (`scatterers.fits.joints`). Only if they hold all vertices of the
-mesh is there a joint at all: a surface whose curvature merely varies is on no quadric. On either side of a joint of i
-and j, s across it,
+Planes and quadrics Q_k = 0 are found first. Only if they hold all vertices of the mesh is there a joint at all: a
+surface whose curvature merely varies is on no quadric. On either side of a joint of i and j, s across it,
 
     Q_i - Q_j = (kappa_i - kappa_j) s^2/2,    n_i - n_j = (kappa_i - kappa_j) s t,
 
