@@ -21,33 +21,25 @@ Also here: charts of a body of pieces that has no edges: six over its radial map
 Sources: [C76, sec. 3-3]; Derivations, B14.
 """
 
+import itertools
 import math
-from collections.abc import Sequence
-from functools import cached_property
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from creeping._typing import FloatArray, IntArray
 from scatterers.body import SHARP, Body, Crease, Levelled, NoCharts, Piece, no_charts, positive
-from scatterers.exact.profile import Segment
-from scatterers.kernels.compiled import Compiled, evaluated
-from scatterers.kernels.revolved import ROWS, SPLINE, WIDTH, evaluate, numbers
-from scatterers.kernels.tensor import HEADER
-
-if TYPE_CHECKING:
-    from scatterers.charts.star import CubeSphereAtlas
-import itertools
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cache
-from typing import NamedTuple
-
 from scatterers.cached import cached
 from scatterers.charts.radial import RadialMap, Spine
 from scatterers.charts.star import CubeSphereAtlas
-from scatterers.kernels.revolved import value_and_gradient
+from scatterers.exact.profile import Segment
+from scatterers.kernels.compiled import Compiled, evaluated
+from scatterers.kernels.revolved import ROWS, SPLINE, WIDTH, evaluate, numbers, value_and_gradient
+from scatterers.kernels.tensor import HEADER
 
 SMALLEST = 1e-6
 """Turn of the tangent, radians, below which a corner is a joint, and an end on the axis no tip."""
@@ -68,9 +60,6 @@ STEEP = 1.1
 """Turn of the profile along a square, radians, at most."""
 SLACK = 0.1
 """By which the box of the map is wider than the body, in its half widths."""
-
-
-Tiles = Callable[[float], tuple[FloatArray, FloatArray, IntArray]]
 
 
 class Squares(NamedTuple):
@@ -308,12 +297,22 @@ class Revolved(Levelled, Body):
         return np.asarray(n / np.linalg.norm(n, axis=-1, keepdims=True))
 
     @cached
-    def atlas(self) -> "CubeSphereAtlas | NoCharts":
+    def atlas(self) -> CubeSphereAtlas | NoCharts:
         """Six charts of a body that has neither edges nor tips and is seen whole from the middle of its box."""
         sharp = [crease for crease in self.creases if crease.kind in SHARP]
         if sharp or self._axes != (0, 1, 2) or self._stretch != 1:
             return no_charts(sharp)
-        return charts(self.bounds, self.tiles, lambda of_map: self._packed(self._profile, of_map))
+        half, middle = 0.5 * np.ptp(self.bounds, axis=0), self.bounds.mean(axis=0)
+        wider = np.stack([self.bounds[0] - SLACK * half, self.bounds[1] + SLACK * half])
+        space = RevolvedSpace(wider, lambda of_map: self._packed(self._profile, of_map))
+        sphere_map = RadialMap(space, middle, half, Spine.none())
+        points = self.tiles(0.05 * float(np.linalg.norm(half)))[0].reshape(-1, 3)
+        if hidden := int(np.sum(~(sphere_map.facing(points) > 0))):
+            return NoCharts(
+                f"the body is not star-shaped about the middle of its box: {hidden} of {len(points)} points are "
+                "hidden; no charts cover it, take its tiles"
+            )
+        return CubeSphereAtlas(sphere_map, sphere_map.compiled_locator)
 
 
 def _shared(tangent: FloatArray, other: FloatArray) -> FloatArray:
@@ -416,20 +415,6 @@ class RevolvedSpace:
     def sources(self) -> dict[str, Callable[..., None]]:
         """Plain Python of the compiled functions."""
         return {"level": evaluate, "forward": _forward()}
-
-
-def charts(bounds: FloatArray, tiles: Tiles, packed: Callable[[FloatArray], FloatArray]) -> CubeSphereAtlas | NoCharts:
-    """Six charts of a body that is seen whole from the middle of its box, none of another."""
-    half = 0.5 * (bounds[1] - bounds[0])
-    space = RevolvedSpace(np.stack([bounds[0] - SLACK * half, bounds[1] + SLACK * half]), packed)
-    sphere_map = RadialMap(space, 0.5 * (bounds[0] + bounds[1]), half, Spine.none())
-    points = tiles(0.05 * float(np.linalg.norm(half)))[0].reshape(-1, 3)
-    if hidden := int(np.sum(~(sphere_map.facing(points) > 0))):
-        return NoCharts(
-            f"the body is not star-shaped about the middle of its box: {hidden} of {len(points)} points are hidden; "
-            "no charts cover it, take its tiles"
-        )
-    return CubeSphereAtlas(sphere_map, sphere_map.compiled_locator)
 
 
 @cache

@@ -80,7 +80,6 @@ class Fitted:
     spline : TensorSpline
     spacing : float
         Of the grid, L.
-    iterations : int
     change : float
         Rms change of the principal curvatures over the last `CHECKED` iterations, 1/L.
     misfit : float
@@ -91,7 +90,6 @@ class Fitted:
 
     spline: TensorSpline
     spacing: float
-    iterations: int
     change: float
     misfit: float
     turn: float
@@ -179,7 +177,7 @@ def fit(
         if change <= accuracy * scale or (keep_start and change > STALLED * changes[-2]):
             break
         changes.append(change)
-    return equations.result(kept if watch.guided else c, done, change / spacing)
+    return equations.result(kept if watch.guided else c, change / spacing)
 
 
 def _product(a: FloatArray, b: FloatArray) -> float:
@@ -364,11 +362,11 @@ class _Equations:
         values = np.ascontiguousarray(c[:-OVERREAD].reshape(self.shape)) * self.spacing
         return TensorSpline(values, self.low, np.full(3, self.spacing))
 
-    def result(self, c: FloatArray, iterations: int, change: float) -> Fitted:
+    def result(self, c: FloatArray, change: float) -> Fitted:
         """The spline, and what is left at the points."""
         spline = self.spline(c)
         misfit, turn = left_at(spline, self.points[self.fitted], self.normals[self.fitted])
-        return Fitted(spline, self.spacing, iterations, change, misfit, turn)
+        return Fitted(spline, self.spacing, change, misfit, turn)
 
 
 class _Watch:
