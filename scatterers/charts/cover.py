@@ -112,8 +112,8 @@ LEAST, FACING, VALID = 0.2, 0.45, 0.4
 BENT = 0.9
 # distance of candidates, in radii of curvature, and the largest, in diagonals of the body's box
 APART, FARTHEST = 0.25, 0.1
-# how much a chart that meets another sheet, or has no height, is shrunk
-SHRINK = 0.85
+# how much a chart that meets another sheet, or has no height, is shrunk, and how many times
+SHRINK, SHRINKS = 0.93, 8
 ROUNDS = 12
 
 
@@ -246,7 +246,9 @@ class _Candidates:
         cloud = self.cloud
         normals = np.ascontiguousarray(cloud.axes[:, 2])
         graph = cloud.points, normals, cloud.bent, cloud.first, cloud.neighbours, cloud.gap
-        while len(start):
+        for attempt in range(SHRINKS):
+            if not len(start):
+                return
             axes = np.ascontiguousarray(cloud.axes[start])
             half, begin, covered, heights = grow(
                 start, axes, longest * self.wider, *graph, LEAST, FACING, BENT * self.wider, self.wider
@@ -254,8 +256,7 @@ class _Candidates:
             lists = np.split(covered, begin[1:-1])
             # corners are where a point of the cloud may be too far to tell
             torn = self._torn(cloud.graphs(start, half), 2)
-            # one that is no wider than the gaps covers nothing
-            good = ~torn | (half < cloud.gap[start])
+            good = ~torn if attempt < SHRINKS - 1 else np.ones(len(start), dtype=bool)
             self.start = np.concatenate([self.start, start[good]])
             self.half = np.concatenate([self.half, half[good]])
             self.heights = np.concatenate([self.heights, heights[good]])
@@ -350,7 +351,7 @@ def covered_by(
         graphs = cloud.graphs(candidates.start[which], candidates.half[which])
         bad = candidates.failing(graphs, which)
         if bad:
-            candidates.add(candidates.start[bad], SHRINK * candidates.half[bad])
+            candidates.add(candidates.start[bad], SHRINK**4 * candidates.half[bad])
             for k in bad:
                 candidates.covered[k] = candidates.covered[k][:0]
         missed = np.ones(len(points), dtype=bool)

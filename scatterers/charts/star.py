@@ -16,11 +16,11 @@ Sources: Derivations, B4.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from creeping._typing import FloatArray, IntArray
-from scatterers.body import SphereMapped
 from scatterers.charts.radial import RadialMap, SpaceLevel, Spine
 from scatterers.charts.samples import Samples
 from scatterers.kernels.compiled import Compiled, evaluated, inverted, mapped
@@ -69,9 +69,9 @@ def _hidden(sphere_map: RadialMap, points: FloatArray) -> str:
 
 @dataclass(frozen=True)
 class FaceChart:
-    """Face ``2 axis + (sign < 0)`` of the equiangular cube over psi."""
+    """Face ``2 axis + (sign < 0)`` of the equiangular cube over psi, which has the members of a `SphereMapped`."""
 
-    sphere_map: SphereMapped
+    sphere_map: Any
     axis: int
     sign: float
     periodic: tuple[bool, bool] = (False, False)
@@ -92,7 +92,7 @@ class FaceChart:
     def point(self, uv: FloatArray) -> FloatArray:
         """Point of the body: (..., 2) -> (..., 3), L."""
         cube, _, _ = self._cube(uv)
-        return self.sphere_map.forward(cube / np.linalg.norm(cube, axis=-1, keepdims=True))
+        return np.asarray(self.sphere_map.forward(cube / np.linalg.norm(cube, axis=-1, keepdims=True)))
 
     def tangents(self, uv: FloatArray) -> FloatArray:
         """Columns x_u, x_v: (..., 2) -> (..., 3, 2), L."""
@@ -113,7 +113,7 @@ class FaceChart:
 class CubeSphereAtlas:
     """Six equiangular face charts over psi; ``compiled`` is a locator for kernels, or None."""
 
-    sphere_map: SphereMapped
+    sphere_map: Any
     compiled: Compiled | None = None
 
     @property

@@ -6,7 +6,7 @@ A smooth body is one piece without creases.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -18,10 +18,6 @@ from scatterers.fits.patch import curved, divided
 from scatterers.fits.selection import PieceSpace
 from scatterers.fits.tensor import TensorSpline
 from scatterers.kernels.compiled import evaluated
-
-if TYPE_CHECKING:
-    pass
-
 
 KINDS = ("edge", "joint", "tip", "seam")
 LEAST = 6

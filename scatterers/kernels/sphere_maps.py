@@ -251,7 +251,7 @@ def _radius(y, parameters):  # type: ignore[no-untyped-def]
 
 
 def forward(s, points, derivatives, parameters):  # type: ignore[no-untyped-def]
-    """Points and derivatives of psi for a block; the compiled twin of forward and derivative."""
+    """Points and derivatives of psi for a block."""
     a, b, c = parameters[HALF_AXES], parameters[HALF_AXES + 1], parameters[HALF_AXES + 2]
     for i in range(s.shape[1]):
         y = (a * s[0, i], b * s[1, i], c * s[2, i])
@@ -287,7 +287,7 @@ def one_cell(box: FloatArray, of_map: FloatArray) -> FloatArray:
 
 
 def inverse(points, s, parameters):  # type: ignore[no-untyped-def]
-    """psi^-1 of a block; the compiled twin of inverse.
+    """psi^-1 of a block.
 
     The shift is not taken from `_spine` so that the loops are vectorised; each touches few rows for the same reason.
     """
@@ -315,7 +315,7 @@ def inverse(points, s, parameters):  # type: ignore[no-untyped-def]
 
 
 def locate(points, gradients, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]
-    """Chart, chart variables and polar frame of points on the body; the compiled twin of locate and polar_frame.
+    """Chart, chart variables and polar frame of points on the body.
 
     The frame does not see the factor r of d psi/ds, nor the length of y, so w - c serves for y.
     """

@@ -5,7 +5,7 @@ derivatives are T_op . w^(q), q = order - o - p at most. Weights are Horner sums
 point costs 36 loads and, for order 2, 144 multiply-adds before the ten dot products. Importing this module imports
 numba.
 
-Also here: constants that the quintic spline and the radial map over it share with their compiled twins.
+Also here: constants that the quintic spline and the radial map over it share.
 
 Compiled S D S of a grid, S from values at nodes to coefficients of B-splines; see `scatterers.fits.tensor`.
 
@@ -256,7 +256,7 @@ def second_derivatives(x, y, z, parameters):  # type: ignore[no-untyped-def]
 
 
 def evaluate(points, values, gradients, hessians, parameters):  # type: ignore[no-untyped-def]
-    """F, grad F and Hessian of a block; the compiled twin of `TensorSpline`."""
+    """F, grad F and Hessian of a block."""
     for i in range(points.shape[1]):
         found = second_derivatives(points[0, i], points[1, i], points[2, i], parameters)
         values[i] = found[0]
