@@ -4,12 +4,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from scatterers.shown import Shown
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
+from creeping._typing import ArrayLike, BoolArray, FloatArray
+from scatterers.body import Shown
 
 
 class Bodies(Shown):

@@ -1,4 +1,4 @@
-"""Body from a CAD file: points and exact normals of its faces by gmsh, and the fit of `scatterers.base.fitted_body`.
+"""Body from a CAD file: points and exact normals of its faces by gmsh, and the fit of `scatterers.fits.fitted_body`.
 
 gmsh is an optional library under the GPL: ``pip install 'creeping[cad]'``.
 """
@@ -10,15 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scatterers.base.fitted_body import FittedBody, checked_options
-from scatterers.base.quadrics import PieceCloud, PointCloud
-from scatterers.cad_file.files import CadPoints, CadReading, kind_of, read_cad
-from scatterers.pieces.regions import regions_of
-from scatterers.spline.cache import key_of
+from scatterers.body import teller
+from scatterers.fits.cache import key_of
+from scatterers.fits.cloud import PieceCloud, PointCloud
+from scatterers.fits.fitted_body import FittedBody
+from scatterers.triangles.cad_file import CadPoints, CadReading, kind_of, read_cad
 from scatterers.triangles.jets import osculating_jets, signed_distance
 from scatterers.triangles.quality import Choice, MeshQuality, assess
+from scatterers.triangles.regions import regions_of
 from scatterers.triangles.topology import edges_of
 
 POINTS = 10_000
@@ -27,9 +27,6 @@ CURVED = 30
 """Triangles to a full turn of a curved face of a body with edges."""
 SPACING = 2.0
 """Spacing of the grid in units of the mean distance of neighbouring points."""
-
-
-FloatArray = NDArray[np.float64]
 
 
 class Cad(FittedBody):
@@ -111,7 +108,7 @@ class Cad(FittedBody):
         if isinstance(points, bool) or not isinstance(points, (int, np.integer)) or not 500 <= points <= 200_000:
             raise ValueError(f"points = {points!r}; give a whole number from 500 to 200000")
         points = int(points)
-        report = checked_options(units, strict, cache, progress)
+        report = teller(progress)
         try:
             # before all of it is read
             kind_of(Path(path))
@@ -130,7 +127,7 @@ class Cad(FittedBody):
         progress("reading the CAD file")
         found = read_cad(path, reading, progress=progress)
         jets = osculating_jets(found.mesh.vertices, found.mesh.triangles)
-        quality = _with_joints(assess(found.mesh, jets), found)
+        quality = _with_joints(assess(found.mesh.vertices, found.mesh.triangles, jets), found)
         if found.edges and strict:
             raise ValueError(f"{path.name} is not smooth: {'; '.join(found.edges[:6])}; round its edges off")
         notes = {"source": path.name, "edges": list(found.edges)}
@@ -144,14 +141,13 @@ class Cad(FittedBody):
             return PieceCloud(
                 mesh.vertices, mesh.triangles, regions, normals, quality, notes | {"repairs": list(mesh.repairs)}
             )
-        non_smooth = np.concatenate([found.mesh.vertices[quality.bad], found.non_smooth])
         return PointCloud(
             found.mesh.vertices,
             np.where(np.isfinite(found.normals), found.normals, jets.normals),
             edge=quality.edge_mean,
             spacing=SPACING * quality.edge_mean,
             noise=0.0,
-            non_smooth=non_smooth,
+            non_smooth=found.mesh.vertices[quality.bad],
             distance=partial(signed_distance, found.mesh.vertices, jets),
             mean_curvature=np.where(jets.fitted & ~quality.bad, jets.mean, np.nan),
             quality=quality,

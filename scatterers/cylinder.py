@@ -22,13 +22,32 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
-from scatterers.base.level_body import finite, positive
+from scatterers.body import finite, positive
 from scatterers.exact.profile import Arc, Line, Segment
 from scatterers.exact.revolved import Revolved
 
 
 @dataclass(frozen=True)
-class Cylinder(Revolved):
+class Lengthy(Revolved):
+    """Base of bodies with a radius and a length; ``_least`` is that of their ratio."""
+
+    radius: float
+    length: float
+    speed: Any = None
+
+    _least = 0.0
+
+    def __post_init__(self) -> None:
+        positive(radius=self.radius, length=self.length)
+        if self.length <= self._least * self.radius:
+            raise ValueError(
+                f"length = {self.length!r} is not more than twice the radius {self.radius!r}; it is that of the whole"
+            )
+        self._set_speed()
+
+
+@dataclass(frozen=True)
+class Cylinder(Lengthy):
     """Circular cylinder about the z axis with flat ends, centred on the origin.
 
     Parameters
@@ -54,14 +73,6 @@ class Cylinder(Revolved):
     >>> can.piece([[0.0, 0.2, 1.5], [0.6, 0.8, 0.0]])
     array([2, 1])
     """
-
-    radius: float
-    length: float
-    speed: Any = None
-
-    def __post_init__(self) -> None:
-        positive(radius=self.radius, length=self.length)
-        self._set_speed()
 
     @cached_property
     def _profile(self) -> Sequence[Segment]:
@@ -118,7 +129,7 @@ class Cone(Revolved):
 
 
 @dataclass(frozen=True)
-class ConeSphere(Revolved):
+class ConeSphere(Lengthy):
     """Sphere about the origin with a cone tangent to it; the axis is z and the tip points towards +z.
 
     Parameters
@@ -146,17 +157,7 @@ class ConeSphere(Revolved):
     0.122173
     """
 
-    radius: float
-    length: float
-    speed: Any = None
-
-    def __post_init__(self) -> None:
-        positive(radius=self.radius, length=self.length)
-        if self.length <= 2 * self.radius:
-            raise ValueError(
-                f"length = {self.length!r} is not more than twice the radius {self.radius!r}; it is that of the whole"
-            )
-        self._set_speed()
+    _least = 2.0
 
     @property
     def half_angle(self) -> float:
@@ -172,7 +173,7 @@ class ConeSphere(Revolved):
 
 
 @dataclass(frozen=True)
-class Capsule(Revolved):
+class Capsule(Lengthy):
     """Cylinder about the z axis with hemispherical ends, centred on the origin.
 
     Parameters
@@ -199,17 +200,7 @@ class Capsule(Revolved):
     6
     """
 
-    radius: float
-    length: float
-    speed: Any = None
-
-    def __post_init__(self) -> None:
-        positive(radius=self.radius, length=self.length)
-        if self.length <= 2 * self.radius:
-            raise ValueError(
-                f"length = {self.length!r} is not more than twice the radius {self.radius!r}; it is that of the whole"
-            )
-        self._set_speed()
+    _least = 2.0
 
     @cached_property
     def _profile(self) -> Sequence[Segment]:

@@ -1,17 +1,84 @@
-"""Ellipsoid of any three semi-axes: F = x^2/a^2 + y^2/b^2 + z^2/c^2 - 1, x = psi(s) = (a s_1, b s_2, c s_3).
+"""Ellipsoids, bent or straight: F = x^2/a^2 + y'^2/b^2 + z^2/c^2 - 1 with y' = y - d cos(pi z).
 
-Also here: sphere about the origin: F = |x|^2/radius^2 - 1, x = psi(s) = radius s.
-
-Also here: twisted ellipsoid: F = x^2/a^2 + (y - d cos(pi z))^2/b^2 + z^2/c^2 - 1.
-
-psi(s) = (a s_1, b s_2 + d cos(pi c s_3), c s_3). Not convex: near z = 0, y < 0 the profile has
-y'' = -pi^2 d + b/c^2 on the default body, negative, so kappa_n < 0 along z there.
+The sphere map is psi(s) = (a s_1, b s_2 + d cos(pi c s_3), c s_3). The three bodies differ in their parameters only,
+so they share one evaluator and one chart locator. A sphere has F = |x|^2/radius^2 - 1. The twisted ellipsoid is not
+convex: near z = 0, y < 0 the profile has y'' = -pi^2 d + b/c^2 on the default body, negative, so kappa_n < 0 along z
+there.
 """
 
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
-from scatterers.base.quadrics import BentEllipsoid, finite, positive
+import numpy as np
+
+from creeping._typing import FloatArray
+from scatterers.body import Body, Levelled, SphereMapped, finite, polar_angles, positive
+from scatterers.cached import cached
+from scatterers.charts.star import CubeSphereAtlas, FaceChart
+from scatterers.kernels.compiled import Compiled, Kind
+from scatterers.kernels.sphere_maps import cos_pi, cube_tangents, fill_frame, sin_pi
+
+
+class BentEllipsoid(Levelled, SphereMapped, Body):
+    """Base of Sphere, Ellipsoid and TwistedEllipsoid; ``_shape`` gives (a, b, c, d)."""
+
+    def _shape(self) -> tuple[float, float, float, float]:
+        raise NotImplementedError
+
+    @cached
+    def bounds(self) -> FloatArray:
+        """Box (2, 3) that contains the body, L."""
+        a, b, c, d = self._shape()
+        half = np.array([a, b + abs(d), c])
+        return np.stack([-half, half])
+
+    def parameters(self, points: FloatArray) -> FloatArray:
+        """Polar angle theta in [0, pi] and azimuth phi in (-pi, pi] of psi^-1(x), radians: (..., 3) -> (..., 2)."""
+        return polar_angles(self.inverse(points))
+
+    def _compiled(self, source: Callable[..., None], kind: Kind) -> Compiled:
+        return Compiled(source, kind, np.array(self._shape(), dtype=float))
+
+    @property
+    def mirrors(self) -> bool:
+        """Whether the three coordinate planes are mirrors of the body and of its sphere map."""
+        return self._shape()[3] == 0.0
+
+    @property
+    def axis_of_revolution(self) -> tuple[float, float, float] | None:
+        """Unit vector along the axis of a spheroid, z of a sphere; None for any other ellipsoid."""
+        a, b, c, d = self._shape()
+        if d != 0.0 or not (a == b or b == c or c == a):
+            return None
+        return (0.0, 0.0, 1.0) if a == b else (1.0, 0.0, 0.0) if b == c else (0.0, 1.0, 0.0)
+
+    @cached_property
+    def compiled(self) -> Compiled:
+        """Compiled level evaluator."""
+        return self._compiled(_evaluate, "level")
+
+    @cached_property
+    def compiled_forward(self) -> Compiled:
+        """Compiled psi and its derivative."""
+        return self._compiled(_forward, "forward")
+
+    @cached_property
+    def compiled_inverse(self) -> Compiled:
+        """Compiled psi^-1, normalised."""
+        return self._compiled(_inverse, "inverse")
+
+    @cached
+    def atlas(self) -> CubeSphereAtlas:
+        """Six charts."""
+        return CubeSphereAtlas(self, self._compiled(_locate, "locator"))
+
+    @property
+    def tiling(self) -> Sequence[FaceChart]:
+        """The six charts."""
+        return self.atlas.charts
 
 
 @dataclass(frozen=True)
@@ -133,3 +200,97 @@ class TwistedEllipsoid(BentEllipsoid):
 
     def _shape(self) -> tuple[float, float, float, float]:
         return self.a, self.b, self.c, self.d
+
+
+def _evaluate(points, values, gradients, hessians, parameters):  # type: ignore[no-untyped-def]
+    """F, grad F and Hessian of a block.
+
+    Each loop touches few rows: the compiler vectorises it only while it can check that they do not overlap.
+    """
+    xx, yy, zz, d = 1 / parameters[0] ** 2, 1 / parameters[1] ** 2, 1 / parameters[2] ** 2, parameters[3]
+    quarter = 1 / (4 * yy)
+    n = points.shape[1]
+    if d != 0.0:
+        # while they are not yet wanted for the Hessian, two of its rows hold d cos(pi z) and pi d sin(pi z)
+        for i in range(n):
+            hessians[3, i] = d * cos_pi(points[2, i])
+            hessians[4, i] = math.pi * d * sin_pi(points[2, i])
+        for i in range(n):
+            gradients[0, i] = 2 * xx * points[0, i]
+            gradients[1, i] = 2 * yy * (points[1, i] - hessians[3, i])
+        for i in range(n):
+            x, z, bent = points[0, i], points[2, i], gradients[1, i]
+            values[i] = xx * x * x + quarter * bent * bent + (zz * z * z - 1.0)
+        for i in range(n):
+            gradients[2, i] = 2 * zz * points[2, i] + gradients[1, i] * hessians[4, i]
+        for i in range(n):
+            slope = hessians[4, i]
+            hessians[2, i] = 2 * zz + 2 * yy * slope * slope + math.pi**2 * gradients[1, i] * hessians[3, i]
+            hessians[3, i] = 2 * yy * slope
+    else:
+        for i in range(n):
+            x, y, z = points[0, i], points[1, i], points[2, i]
+            values[i] = xx * x * x + yy * y * y + (zz * z * z - 1.0)
+            gradients[0, i] = 2 * xx * x
+        for i in range(n):
+            gradients[1, i] = 2 * yy * points[1, i]
+            gradients[2, i] = 2 * zz * points[2, i]
+        for i in range(n):
+            hessians[2, i] = 2 * zz
+            hessians[3, i] = 0.0
+    for i in range(n):
+        hessians[0, i] = 2 * xx
+        hessians[1, i] = 2 * yy
+        hessians[4, i] = 0.0
+        hessians[5, i] = 0.0
+
+
+def _locate(points, gradients, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]
+    """Chart, chart variables and polar frame of a block."""
+    a, b, c, d = parameters[0], parameters[1], parameters[2], parameters[3]
+    for i in range(points.shape[1]):
+        z = points[2, i]
+        bend, shear = 0.0, 0.0
+        if d != 0.0:
+            bend, shear = d * cos_pi(z), -math.pi * c * d * sin_pi(z)
+        chart[i], uv[0, i], uv[1, i], tx, ty, tz, wx, wy, wz = cube_tangents(
+            points[0, i] / a, (points[1, i] - bend) / b, z / c
+        )
+        fill_frame(frame, i, a * tx, b * ty + shear * tz, c * tz, a * wx, b * wy + shear * wz, c * wz)
+
+
+def _forward(s, points, derivatives, parameters):  # type: ignore[no-untyped-def]
+    """Points and derivatives of psi for a block."""
+    a, b, c, d = parameters[0], parameters[1], parameters[2], parameters[3]
+    n = s.shape[1]
+    for i in range(n):
+        points[0, i] = a * s[0, i]
+        points[2, i] = c * s[2, i]
+    for i in range(n):
+        points[1, i] = b * s[1, i]
+        derivatives[5, i] = 0.0
+    if d != 0.0:
+        for i in range(n):
+            points[1, i] += d * cos_pi(c * s[2, i])
+        for i in range(n):
+            derivatives[5, i] = -math.pi * c * d * sin_pi(c * s[2, i])
+    for i in range(n):
+        derivatives[0, i], derivatives[1, i], derivatives[2, i] = a, 0.0, 0.0
+        derivatives[3, i], derivatives[4, i] = 0.0, b
+    for i in range(n):
+        derivatives[6, i], derivatives[7, i], derivatives[8, i] = 0.0, 0.0, c
+
+
+def _inverse(points, s, parameters):  # type: ignore[no-untyped-def]
+    """psi^-1 of a block, of unit length."""
+    a, b, c, d = 1 / parameters[0], 1 / parameters[1], 1 / parameters[2], parameters[3]
+    n = points.shape[1]
+    for i in range(n):
+        s[1, i] = points[1, i]
+    if d != 0.0:
+        for i in range(n):
+            s[1, i] -= d * cos_pi(points[2, i])
+    for i in range(n):
+        x, y, z = a * points[0, i], b * s[1, i], c * points[2, i]
+        scale = 1.0 / math.sqrt(x * x + y * y + z * z)
+        s[0, i], s[1, i], s[2, i] = scale * x, scale * y, scale * z

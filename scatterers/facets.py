@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scatterers.cad_file.files import SUFFIXES, CadReading, cad_triangles
-from scatterers.shown import Shown, teller
+from creeping._typing import BoolArray, FloatArray, IntArray
+from scatterers.body import Shown, teller
+from scatterers.triangles.cad_file import SUFFIXES, CadReading, cad_triangles
 from scatterers.triangles.files import read_mesh
 from scatterers.triangles.quality import Choice
 
@@ -25,11 +25,6 @@ CELLS = 512
 """Cells along a side of the plane across rays, at most."""
 MOST = 10_000_000
 """Pairs of a triangle and a cell, at most."""
-
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 
 class Facets(Shown):

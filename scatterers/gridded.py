@@ -6,37 +6,21 @@ Sources: [B78]; Derivations, B7.
 """
 
 import hashlib
-import reprlib
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from scatterers.base.level_body import LevelBody, numbers
-from scatterers.sphere_map.star import star_map
-from scatterers.spline.cloud import Samples
-from scatterers.spline.tensor import TensorSpline, coefficients
+from creeping._typing import ArrayLike, FloatArray
+from scatterers.body import box_of, numbers, numbers_of, positive
+from scatterers.charts.level_body import LevelBody
+from scatterers.charts.samples import Samples
+from scatterers.charts.star import star_map
+from scatterers.fits.tensor import TensorSpline, coefficients
 
 MOST = 1000
 """Nodes along an axis of a body that is sampled."""
 FEWEST = 8
-
-
-FloatArray = NDArray[np.float64]
-
-
-class Level(Protocol):
-    """What `Gridded.sampled` asks of the body that it samples."""
-
-    @property
-    def bounds(self) -> FloatArray:
-        """Box (2, 3) that contains the body, L."""
-        ...
-
-    def level(self, points: FloatArray) -> FloatArray:
-        """F, positive outside: points (..., 3), L, to (...)."""
-        ...
 
 
 class Gridded(LevelBody):
@@ -75,12 +59,10 @@ class Gridded(LevelBody):
     def __init__(
         self, samples: ArrayLike, bounds: ArrayLike, *, centre: ArrayLike | None = None, speed: Any = None
     ) -> None:
-        box = _numbers("bounds", bounds, (2, 3))
-        if not np.all(box[1] > box[0]):
-            raise ValueError(f"bounds {box.tolist()} are no box; give ((x0, y0, z0), (x1, y1, z1)) with x0 < x1 etc.")
+        box = box_of(bounds)
         nodes = _checked(samples)
         spacing = (box[1] - box[0]) / (np.array(nodes.shape) - 1)
-        given = None if centre is None else _numbers("centre", centre, (3,))
+        given = None if centre is None else numbers_of("centre", centre, (3,))
         self.speed = speed
         self._set_speed()
         spline = TensorSpline(coefficients(nodes), box[0], spacing)
@@ -99,7 +81,7 @@ class Gridded(LevelBody):
     @classmethod
     def sampled(
         cls,
-        body: Level,
+        body: Any,
         nodes: int | Sequence[int] = 64,
         margin: float = 0.15,
         *,
@@ -129,16 +111,11 @@ class Gridded(LevelBody):
         >>> float(abs(body.level([0.0, 0.8, 0.0])).round(9))
         0.0
         """
-        if not all(hasattr(body, name) for name in ("level", "bounds")) or isinstance(body, type):
-            raise ValueError(f"{reprlib.repr(body)} is no body: it needs level and bounds")
-        counts = [nodes] * 3 if isinstance(nodes, int) else list(nodes) if isinstance(nodes, (list, tuple)) else []
-        if len(counts) != 3 or any(
-            isinstance(n, bool) or not isinstance(n, int) or not FEWEST <= n <= MOST for n in counts
-        ):
+        counts = np.broadcast_to(nodes, 3).tolist()
+        if not all(FEWEST <= n <= MOST for n in counts):
             raise ValueError(f"nodes = {nodes!r}; give one or three whole numbers from {FEWEST} to {MOST}")
-        if isinstance(margin, bool) or not isinstance(margin, (int, float)) or not 0 < margin <= 1e9:
-            raise ValueError(f"margin = {margin!r} is not a positive finite number; give e.g. 0.15")
-        box = _numbers("bounds", body.bounds, (2, 3))
+        positive(margin=margin)
+        box = numbers_of("bounds", body.bounds, (2, 3))
         widened = margin * 0.5 * (box[1] - box[0])
         box = np.stack([box[0] - widened, box[1] + widened])
         x, y, z = (np.linspace(box[0, k], box[1, k], counts[k]) for k in range(3))
@@ -152,16 +129,6 @@ class Gridded(LevelBody):
 
     def _identity(self) -> str:
         return self._digest
-
-
-def _numbers(name: str, values: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
-    try:
-        found = numbers(values)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} = {reprlib.repr(values)} are not numbers; give an array of shape {shape}") from None
-    if found.shape != shape or not np.all(np.isfinite(found)):
-        raise ValueError(f"{name} = {values!r} is no array of {shape} finite numbers")
-    return found
 
 
 def _checked(samples: ArrayLike) -> FloatArray:

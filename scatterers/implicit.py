@@ -1,25 +1,25 @@
 """Body F(x, y, z) = 0 from an expression: differentiated by sympy, compiled, and examined before use.
 
-The body is looked for on grids (`scatterers.expression.singularities`): F < 0 in one connected region inside the box, F
-> 0 in one around it. Then places are looked for where it is not smooth: tips (`scatterers.expression.singularities`),
+The body is looked for on grids (`scatterers.exact.singularities`): F < 0 in one connected region inside the box, F
+> 0 in one around it. Then places are looked for where it is not smooth: tips (`scatterers.exact.singularities`),
 and curves along which max, min and where change their choice and the normal or the curvature jumps.
 """
 
 import hashlib
-import reprlib
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from scatterers.base.level_body import LevelBody, numbers, positive
+from creeping._typing import ArrayLike, FloatArray, IntArray
+from scatterers.body import SHARP, Crease, Piece, box_of, no_charts, numbers_of, positive
 from scatterers.cached import cached
-from scatterers.exact.body import SHARP, Piece, no_charts
+from scatterers.charts.level_body import LevelBody
+from scatterers.charts.samples import Samples
+from scatterers.charts.star import star_map
 from scatterers.exact.clipped import clip, creases, march, normals
-from scatterers.expression.parsing import one_sided
-from scatterers.expression.singularities import (
+from scatterers.exact.singularities import (
     FINE,
     SIZES,
     distinct,
@@ -34,19 +34,12 @@ from scatterers.expression.singularities import (
     singular_points,
     tightened,
 )
-from scatterers.expression.space import ExpressionSpace
-from scatterers.expression.switches import Switches
-from scatterers.pieces.patch import Crease
-from scatterers.sphere_map.star import star_map
-from scatterers.spline.cloud import Samples
+from scatterers.exact.switches import ExpressionSpace, Switches
+from scatterers.expression import one_sided
 
 MOST_TIPS = 8
 PER_EDGE = 1.5
 """Cells of the grid to an edge of tiles: sides are 1.15 edges at most."""
-
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 class Implicit(LevelBody):
@@ -97,14 +90,12 @@ class Implicit(LevelBody):
         strict: bool = False,
         speed: Any = None,
     ) -> None:
-        if not isinstance(strict, bool):
-            raise ValueError(f"strict = {strict!r} is neither True nor False")
         expression = one_sided(expression)
         everywhere = ExpressionSpace(expression, np.array([[-SIZES[-1]] * 3, [SIZES[-1]] * 3]))
         self.expression = expression
         self.speed = speed
         self._set_speed()
-        box = found_box(everywhere) if bounds is None else _box(bounds)
+        box = found_box(everywhere) if bounds is None else box_of(bounds)
         samples = samples_of(everywhere, box, FINE)
         examine(expression, samples, bounds is not None)
         if np.all(np.ptp(samples.inside, axis=0) < 0.5 * np.ptp(box, axis=0)):
@@ -112,7 +103,7 @@ class Implicit(LevelBody):
             box = np.clip(tightened(everywhere, samples), box[0], box[1])
             samples = samples_of(everywhere, box, FINE)
             examine(expression, samples, True)
-        given = None if centre is None else _point(centre)
+        given = None if centre is None else numbers_of("centre", centre, (3,))
         self._shape(expression, samples, given)
         tips = self._tips(samples, strict)
         along = self._found_creases(samples, strict)
@@ -258,23 +249,3 @@ class PiecewiseImplicit(Implicit):
         """Charts of a body without edges and tips; asking others for charts raises an error."""
         sharp = [crease for crease in self._creases if crease.kind in SHARP]
         return no_charts(sharp) if sharp else super().atlas
-
-
-def _box(bounds: ArrayLike) -> FloatArray:
-    try:
-        box = numbers(bounds)
-    except (TypeError, ValueError):
-        raise ValueError(f"bounds {reprlib.repr(bounds)} are not numbers; give ((x0, y0, z0), (x1, y1, z1))") from None
-    if box.shape != (2, 3) or not np.all(np.isfinite(box)) or not np.all(box[1] > box[0]):
-        raise ValueError(f"bounds {box.tolist()} are no box; give ((x0, y0, z0), (x1, y1, z1)) with x0 < x1 etc.")
-    return box
-
-
-def _point(centre: ArrayLike) -> FloatArray:
-    try:
-        point = numbers(centre)
-    except (TypeError, ValueError):
-        raise ValueError(f"centre {reprlib.repr(centre)} is not a point; give (x, y, z)") from None
-    if point.shape != (3,) or not np.all(np.isfinite(point)):
-        raise ValueError(f"centre {centre!r} is not a point; give (x, y, z)")
-    return point

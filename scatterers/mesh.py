@@ -1,7 +1,7 @@
 """Body from a triangle mesh: checked, repaired where that is safe, and replaced by a smooth F.
 
 Vertices are taken to lie on the body. Their normals are those of osculating jets (`scatterers.triangles.jets`), which
-give points between them, too; to both a quintic tensor-product B-spline is fitted (`scatterers.spline.fitting`), twice,
+give points between them, too; to both a quintic tensor-product B-spline is fitted (`scatterers.fits.solver`), twice,
 on grids of different spacing: by their difference the curvatures' error is known.
 
 Sources: [CP05]; Derivations, B5 and B6.
@@ -15,17 +15,17 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scatterers.base.fitted_body import FittedBody, checked_options
-from scatterers.base.quadrics import DISTRUSTED, Nearer, PieceCloud, PointCloud
-from scatterers.pieces.joints import Jointed, jointed
-from scatterers.pieces.regions import regions_of
-from scatterers.spline.cache import key_of
-from scatterers.spline.fitting import spacing_of
+from scatterers.body import teller
+from scatterers.fits.cache import key_of
+from scatterers.fits.cloud import DISTRUSTED, Nearer, PieceCloud, PointCloud
+from scatterers.fits.fitted_body import FittedBody
+from scatterers.fits.joints import Jointed, jointed
+from scatterers.fits.solver import spacing_of
 from scatterers.triangles.files import TriangleMesh, mesh_bytes, read_mesh
 from scatterers.triangles.jets import Jets, angle_weighted_normals, centroids, osculating_jets, signed_distance
 from scatterers.triangles.quality import FEWEST_RIMS, Choice, MeshQuality, assess, jumps_at, noise_at_most
+from scatterers.triangles.regions import regions_of
 from scatterers.triangles.subdivision import MOST_SUBDIVIDED, Subdivision, edges_where_curved, subdivided
 
 CLEAN, NOISY = 1.3, 4.0
@@ -48,9 +48,6 @@ FEW_BAD = 0.05
 """Share of bad vertices up to which they are left out; beyond, the fit is judged as a whole,"""
 UNCERTAIN, UNCERTAIN_SUBDIVIDED = 0.25, 0.5
 """by how far its curvatures depend on the grid, relative to their rms; of a subdivided mesh more is counted."""
-
-
-FloatArray = NDArray[np.float64]
 
 
 class Mesh(FittedBody):
@@ -131,7 +128,7 @@ class Mesh(FittedBody):
         if surface == "auto":
             # made already
             return
-        report = checked_options(units, strict, cache, progress)
+        report = teller(progress)
         in_memory = hasattr(source, "vertices") and hasattr(source, "faces")
         if in_memory and units is None and getattr(source, "units", None) is None:
             self.unit = "L"
@@ -273,7 +270,7 @@ def _examined(source: Any, units: str | None, choice: Choice, progress: Callable
     mesh, times = read_mesh(source, units, choice, progress=progress), choice.subdivide
     progress(f"normals of {len(mesh.vertices)} vertices")
     jets = osculating_jets(mesh.vertices, mesh.triangles)
-    quality, joints = _with_joints(assess(mesh, jets), mesh, jets)
+    quality, joints = _with_joints(assess(mesh.vertices, mesh.triangles, jets), mesh, jets)
     pieces = _pieces(mesh, quality, joints, source_name(source))
     if times is None or (times == "auto" and (quality.verdict != "too coarse" or pieces is not None)):
         return _Examined(mesh, jets, quality, pieces)
@@ -291,7 +288,7 @@ def _examined(source: Any, units: str | None, choice: Choice, progress: Callable
         found = TriangleMesh(loop.vertices, loop.triangles, (*mesh.repairs, *notes), loop)
         progress(f"normals of {len(found.vertices)} vertices")
         jets = osculating_jets(found.vertices, found.triangles)
-        quality = assess(found, jets)
+        quality = assess(found.vertices, found.triangles, jets)
         if quality.verdict != "too coarse" or len(found.vertices) >= FEWEST_SUBDIVIDED:
             break
     for line in found.repairs[len(mesh.repairs) :]:

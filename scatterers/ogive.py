@@ -33,7 +33,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from scatterers.base.level_body import finite, positive
+from scatterers.body import finite, positive
+from scatterers.cylinder import Lengthy
 from scatterers.exact.profile import Arc, Segment
 from scatterers.exact.revolved import Revolved
 
@@ -46,7 +47,7 @@ Pair = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Ogive(Revolved):
+class Ogive(Lengthy):
     """Circular arc rotated about its chord, the z axis; it has two tips and is centred on the origin.
 
     Parameters
@@ -71,15 +72,7 @@ class Ogive(Revolved):
     (['tip', 'tip'], 0.394791)
     """
 
-    radius: float
-    length: float
-    speed: Any = None
-
-    def __post_init__(self) -> None:
-        positive(radius=self.radius, length=self.length)
-        if self.length <= 2 * self.radius:
-            raise ValueError(f"length = {self.length!r} is not more than twice the radius {self.radius!r}")
-        self._set_speed()
+    _least = 2.0
 
     @property
     def half_angle(self) -> float:

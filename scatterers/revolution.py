@@ -12,9 +12,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from scatterers.base.level_body import numbers
+from creeping._typing import ArrayLike, FloatArray
+from scatterers.body import numbers
 from scatterers.exact.profile import Line, Segment, SplineSegment, smooth_end, upward
 from scatterers.exact.revolved import Revolved
 
@@ -24,9 +24,6 @@ MOST_POINTS = 200_000
 """Of a table: half a gigabyte of splines, in ten seconds."""
 ROUNDING = 1e-14
 """Numbers of a table this small, relative to the largest, are 0."""
-
-
-FloatArray = NDArray[np.float64]
 
 
 class Revolution(Revolved):

@@ -7,17 +7,14 @@ Also here: admittance of a coating that varies over a body, from expressions in 
 Expressions are parsed by a whitelist; they never pass through ``eval`` as written.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scatterers.kernels.compiled import Compiled
-
-FloatArray = NDArray[np.float64]
+from creeping._typing import ComplexArray, FloatArray
+from scatterers.kernels.compiled import SYMMETRIC, Compiled, evaluated
 
 
 @dataclass(frozen=True)
@@ -50,7 +47,7 @@ class ExpressionSpeed:
 
     @cached_property
     def _functions(self) -> Any:
-        from scatterers.expression.parsing import differentiate
+        from scatterers.expression import differentiate
 
         return differentiate(self.expression)
 
@@ -70,23 +67,15 @@ class ExpressionSpeed:
 
     def value(self, points: FloatArray) -> FloatArray:
         """c, L over time: points (..., 3), L, to (...)."""
-        return _stacked(self._functions.value, points)[..., 0]
+        return evaluated(self.compiled, points)[0]
 
     def gradient(self, points: FloatArray) -> FloatArray:
         """grad c, 1/time: points (..., 3), L, to (..., 3)."""
-        return _stacked(self._functions.gradient, points)
+        return evaluated(self.compiled, points)[1]
 
     def hessian(self, points: FloatArray) -> FloatArray:
         """Hessian of c, 1/(L time): points (..., 3), L, to (..., 3, 3)."""
-        xx, yy, zz, yz, xz, xy = np.moveaxis(_stacked(self._functions.hessian, points), -1, 0)
-        rows = [np.stack(row, axis=-1) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))]
-        return np.stack(rows, axis=-2)
-
-
-def _stacked(function: Callable[..., Any], points: FloatArray) -> FloatArray:
-    """Call with x, y, z and stack the results along a last axis."""
-    x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
-    return np.stack([np.broadcast_to(np.asarray(v, dtype=float), x.shape) for v in function(x, y, z)], axis=-1)
+        return evaluated(self.compiled, points)[2][..., SYMMETRIC]
 
 
 def as_speed(speed: Any) -> Any:
@@ -137,7 +126,7 @@ class Coating:
 
     @cached_property
     def _functions(self) -> Any:
-        from scatterers.expression.parsing import differentiate
+        from scatterers.expression import differentiate
 
         return tuple(differentiate(text).value for text in (self.real, self.imaginary))
 
@@ -150,7 +139,7 @@ class Coating:
         """Text that changes with the admittance."""
         return self.real if self.imaginary == "0" else f"{self.real} + 1j*({self.imaginary})"
 
-    def value(self, points: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def value(self, points: FloatArray) -> ComplexArray:
         """Eta (...) at points (..., 3), L."""
         x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
         real, imaginary = (np.broadcast_to(function(x, y, z)[0], x.shape) for function in self._functions)

@@ -11,19 +11,17 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scatterers.base.level_body import Body, positive
+from creeping._typing import FloatArray
+from scatterers.body import Body, Levelled, positive
 from scatterers.cached import cached
+from scatterers.charts.star import PeriodicAtlas, PeriodicChart
 from scatterers.kernels.compiled import Compiled
-from scatterers.kernels.trigonometry import cos_pi, sin_pi, turns
-from scatterers.sphere_map.star import PeriodicAtlas, PeriodicChart
-
-FloatArray = NDArray[np.float64]
+from scatterers.kernels.sphere_maps import cos_pi, sin_pi, turns
 
 
 @dataclass(frozen=True)
-class Torus(Body):
+class Torus(Levelled, Body):
     """Torus about the z axis.
 
     Parameters
@@ -44,8 +42,8 @@ class Torus(Body):
     --------
     >>> import scatterers as sc
     >>> ring = sc.Torus(R=1.0, r=0.5)
-    >>> ring.level([[1.5, 0.0, 0.0], [1.0, 0.0, 0.0]])          # on the body, on the centre circle
-    array([ 0., -1.])
+    >>> abs(ring.level([[1.5, 0.0, 0.0], [1.0, 0.0, 0.0]])).round(12)          # on the body, on the centre circle
+    array([0., 1.])
     >>> ring.parameters([0.0, 1.5, 0.0]).round(6)               # theta, psi
     array([0.      , 1.570796])
     """
@@ -71,53 +69,10 @@ class Torus(Body):
         """Unit vector along the axis."""
         return 0.0, 0.0, 1.0
 
-    def level(self, points: FloatArray) -> FloatArray:
-        """F, without unit, positive outside: points (..., 3), L, to (...)."""
-        x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
-        return np.asarray(((np.hypot(x, y) - self.R) ** 2 + z**2) / self.r**2 - 1)
-
-    def gradient(self, points: FloatArray) -> FloatArray:
-        """Gradient of F, 1/L: points (..., 3), L, to (..., 3).
-
-        On the axis, far from the body, its radial part is set to 0.
-        """
-        x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
-        rho = np.hypot(x, y)
-        radial = np.where(rho > 0, 1 - self.R / np.where(rho > 0, rho, 1.0), 0.0)
-        return np.stack([radial * x, radial * y, z], axis=-1) * (2 / self.r**2)
-
-    def hessian(self, points: FloatArray) -> FloatArray:
-        """Hessian of F, 1/L^2: points (..., 3), L, to (..., 3, 3)."""
-        x, y, _ = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
-        rho = np.hypot(x, y)
-        rho = np.where(rho > 0, rho, 1.0)
-        h = np.zeros((*x.shape, 3, 3))
-        h[..., 0, 0] = 1 - self.R * y**2 / rho**3
-        h[..., 1, 1] = 1 - self.R * x**2 / rho**3
-        h[..., 0, 1] = h[..., 1, 0] = self.R * x * y / rho**3
-        h[..., 2, 2] = 1.0
-        return h * (2 / self.r**2)
-
     def parameters(self, points: FloatArray) -> FloatArray:
         """Angles (theta, psi), radians, both in (-pi, pi]: points (..., 3), L, to (..., 2)."""
         x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
         return np.stack([np.arctan2(z, np.hypot(x, y) - self.R), np.arctan2(y, x)], axis=-1)
-
-    def _point(self, uv: FloatArray) -> FloatArray:
-        psi, theta = 2 * np.pi * uv[..., 0], 2 * np.pi * uv[..., 1]
-        rho = self.R + self.r * np.cos(theta)
-        return np.stack([rho * np.cos(psi), rho * np.sin(psi), self.r * np.sin(theta)], axis=-1)
-
-    def _tangents(self, uv: FloatArray) -> FloatArray:
-        psi, theta = 2 * np.pi * uv[..., 0], 2 * np.pi * uv[..., 1]
-        rho = self.R + self.r * np.cos(theta)
-        x_u = np.stack([-rho * np.sin(psi), rho * np.cos(psi), np.zeros_like(psi)], axis=-1)
-        sin = self.r * np.sin(theta)
-        x_v = np.stack([-sin * np.cos(psi), -sin * np.sin(psi), self.r * np.cos(theta)], axis=-1)
-        return 2 * np.pi * np.stack([x_u, x_v], axis=-1)
-
-    def _coordinates(self, points: FloatArray) -> FloatArray:
-        return self.parameters(points)[..., ::-1] / (2 * np.pi)
 
     @cached_property
     def compiled(self) -> Compiled:
@@ -127,10 +82,9 @@ class Torus(Body):
     @cached
     def atlas(self) -> PeriodicAtlas:
         """One doubly periodic chart."""
-        chart = PeriodicChart(self._point, self._tangents)
         radii = np.array([self.R, self.r])
         there, back = Compiled(_forward, "forward", radii), Compiled(_inverse, "inverse", radii)
-        return PeriodicAtlas(chart, self._coordinates, Compiled(_locate, "locator", radii), there, back)
+        return PeriodicAtlas(Compiled(_locate, "locator", radii), there, back)
 
     @property
     def tiling(self) -> Sequence[PeriodicChart]:
@@ -139,7 +93,7 @@ class Torus(Body):
 
 
 def _evaluate(points, values, gradients, hessians, parameters):  # type: ignore[no-untyped-def]
-    """F, grad F and Hessian of a block; the compiled twin of level, gradient and hessian.
+    """F, grad F and Hessian of a block.
 
     Each loop touches few rows: the compiler vectorises it only while it can check that they do not overlap.
     """
@@ -174,7 +128,7 @@ def _evaluate(points, values, gradients, hessians, parameters):  # type: ignore[
 
 
 def _locate(points, gradients, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]
-    """Chart, chart variables and polar frame of a block; the compiled twin of locate and polar_frame."""
+    """Chart, chart variables and polar frame of a block."""
     turn = 1 / (2 * math.pi)
     for i in range(points.shape[1]):
         x, y, z = points[0, i], points[1, i], points[2, i]
@@ -193,7 +147,7 @@ def _locate(points, gradients, chart, uv, frame, parameters):  # type: ignore[no
 
 
 def _forward(chart, points, derivatives, parameters):  # type: ignore[no-untyped-def]
-    """Points and tangents of a block; the compiled twin of the chart's point and tangents."""
+    """Points and tangents of a block."""
     major, minor = parameters[0], parameters[1]
     turn = 2 * math.pi
     n = chart.shape[1]

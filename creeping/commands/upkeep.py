@@ -61,7 +61,7 @@ def list_maps(*, json_: options.Json = False) -> int:
     from creeping.errors import CreepingError
     from creeping.phaseflow import cache as caching
     from creeping.storage import folder as storing
-    from scatterers.spline import cache as _fit_cache
+    from scatterers.fits import cache as _fit_cache
 
     # names of the files that fitted bodies were made from, by the names of the fits; of those that know
     loaded = ((file.stem, _fit_cache.load(file.parent, file.stem)) for file in _fits())
@@ -99,7 +99,7 @@ def verify_maps() -> int:
     from creeping.errors import CreepingError
     from creeping.kernels.private_cache import require_private
     from creeping.storage import folder as storing
-    from scatterers.spline import cache as _fit_cache
+    from scatterers.fits import cache as _fit_cache
 
     damaged = 0
     for folder in _stored():
@@ -125,7 +125,7 @@ def clear_maps() -> int:
     Exit code 3 if anything is left.
     """
     from creeping.storage.folder import remove_folder
-    from scatterers.spline import cache as _fit_cache
+    from scatterers.fits import cache as _fit_cache
 
     folders, files = _stored(), _fits()
     left = [reason for folder in folders if (reason := remove_folder(folder))]
@@ -152,7 +152,7 @@ def _stored() -> list[Path]:
 
 
 def _fits() -> list[Path]:
-    from scatterers.spline import cache as _fit_cache
+    from scatterers.fits import cache as _fit_cache
 
     root = _fit_cache.cache_folder()
     return sorted(root.glob("*.npz")) if root.is_dir() else []

@@ -16,17 +16,19 @@ Sources: [C76, sec. 2-2].
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import permutations
-from typing import Literal, Protocol
+from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scatterers.pieces.patch import Crease
+from creeping._typing import FloatArray, IntArray
+from scatterers.body import Crease, Levelled
+from scatterers.charts.samples import Field, sampled, towards
+from scatterers.triangles.regions import curves
+from scatterers.triangles.topology import cut, edges_of
 
 NEWTON = 20
-HALVINGS = 45
+HALVINGS = 50
 SHALLOW = 1e-3
 """Angle between normals, radians, below which both levels together do not tell the place."""
 EDGE, JUMP = 1e-5, 1e-6
@@ -35,9 +37,6 @@ TOUCHING = 1e-12
 """Singular values of gradients, relative, below which pieces touch there: rounding of F would be divided by them."""
 THIN = 0.5
 """Points of a crease closer than this, in the triangulation's spacing, are left out."""
-MOST = 20_000_000
-"""Nodes of the largest grid."""
-MARCHING_HALVINGS = 50
 # corners of the six tetrahedra of a cube, as steps from its first node
 STEPS = np.array(
     [
@@ -47,105 +46,55 @@ STEPS = np.array(
 )
 
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-
-
-class Level(Protocol):
-    """F with its derivatives."""
-
-    def level(self, points: FloatArray) -> FloatArray:
-        """F: points (..., 3), L, to (...)."""
-        ...
-
-    def gradient(self, points: FloatArray) -> FloatArray:
-        """Gradient of F: points (..., 3), L, to (..., 3)."""
-        ...
-
-    def hessian(self, points: FloatArray) -> FloatArray:
-        """Hessian of F: points (..., 3), L, to (..., 3, 3)."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
-class Clipped:
-    """Triangles each on one piece, and the cuts between them.
+class Clipped(NamedTuple):
+    """A closed mesh whose triangles lie on one piece each.
 
     Attributes
     ----------
-    corners : (m, 3, 3), L
+    vertices, triangles : (n, 3), L, and (m, 3)
         Counter-clockwise from outside.
     pieces : (m,)
-    cuts : (k, 2, 3), L
-        Segments of creases.
-    nodes : (k, 2)
-        Numbers of their ends: the same where cuts meet.
-    sides : (k, 2)
-        Pieces on either side, in order.
     """
 
-    corners: FloatArray
+    vertices: FloatArray
+    triangles: IntArray
     pieces: IntArray
-    cuts: FloatArray
-    nodes: IntArray
-    sides: IntArray
+
+    @property
+    def corners(self) -> FloatArray:
+        """Corners (m, 3, 3), L."""
+        return self.vertices[self.triangles]
 
 
 def clip(
-    body: Level,
-    pieces: Sequence[Level],
+    body: Levelled,
+    pieces: Sequence[Levelled],
     numbers: Callable[[FloatArray], IntArray],
     points: FloatArray,
     triangles: IntArray,
 ) -> Clipped:
     """Triangles (m, 3) with corners among points (n, 3), L, on the body, cut where the number of the piece changes."""
-    of_point = numbers(points)
-    kinds = of_point[triangles]
-    sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1), axis=-1)
-    mixed = np.any(kinds != kinds[:, :1], axis=1)
-    pairs, which = np.unique(sides[mixed].reshape(-1, 2), axis=0, return_inverse=True)
-    # of the sides between two pieces; the others stay unused
-    between = _on_both(body, pieces, numbers, *(points[end] for end in pairs.T), *(of_point[end] for end in pairs.T))
-    which = which.reshape(-1, 3)
-    x, k = points[triangles[mixed]], kinds[mixed]
-    cut = between[which]
-    corners, numbered = [points[triangles[~mixed]]], [kinds[~mixed, 0]]
-    cuts, nodes, apart = [], [], []
-    for odd in range(3):
-        i, j, h = odd, (odd + 1) % 3, (odd + 2) % 3
-        two = (k[:, j] == k[:, h]) & (k[:, i] != k[:, j])
-        # cuts of the sides i-j and h-i
-        after, before = cut[two, i], cut[two, h]
-        corners += [
-            np.stack([x[two, i], after, before], axis=1),
-            np.stack([after, x[two, j], x[two, h]], axis=1),
-            np.stack([after, x[two, h], before], axis=1),
-        ]
-        numbered += [k[two, i], k[two, j], k[two, j]]
-        cuts.append(np.stack([after, before], axis=1))
-        nodes.append(np.stack([which[two, i], which[two, h]], axis=-1))
-        apart.append(np.stack([k[two, i], k[two, j]], axis=-1))
-    three = np.flatnonzero((k[:, 0] != k[:, 1]) & (k[:, 1] != k[:, 2]) & (k[:, 2] != k[:, 0]))
-    middle = _on_all(pieces, x[three].mean(axis=1), k[three])
-    for i in range(3):
-        after, before = cut[three, i], cut[three, (i + 2) % 3]
-        corners += [np.stack([x[three, i], after, middle], axis=1), np.stack([x[three, i], middle, before], axis=1)]
-        numbered += [k[three, i], k[three, i]]
-        cuts.append(np.stack([after, middle], axis=1))
-        nodes.append(np.stack([which[three, i], len(pairs) + three], axis=-1))
-        apart.append(np.stack([k[three, i], k[three, (i + 1) % 3]], axis=-1))
-    return Clipped(
-        np.concatenate(corners),
-        np.concatenate(numbered),
-        np.concatenate(cuts),
-        np.concatenate(nodes).astype(np.int64),
-        np.sort(np.concatenate(apart), axis=-1).astype(np.int64),
-    )
+    kind = numbers(points)
+    a, b, c = triangles.T
+    three = (kind[a] != kind[b]) & (kind[b] != kind[c]) & (kind[c] != kind[a])
+    middle = _on_all(pieces, points[triangles[three]].mean(axis=1), kind[triangles[three]])
+    new = len(points) + np.arange(len(middle))
+    fans = [np.stack([start[three], end[three], new], axis=1) for start, end in ((a, b), (b, c), (c, a))]
+    points, triangles = np.concatenate([points, middle]), np.concatenate([triangles[~three], *fans])
+    # what is on several has no number
+    kind = np.concatenate([kind, np.full(len(middle), -1)])
+    start, end = edges_of(triangles).ends.T
+    at = np.flatnonzero((kind[start] != kind[end]) & (kind[start] >= 0) & (kind[end] >= 0))
+    start, end = start[at], end[at]
+    between = _on_both(body, pieces, numbers, points[start], points[end], kind[start], kind[end])
+    vertices, triangles = cut(points, triangles, at, between)
+    kind = np.concatenate([kind, np.full(len(at), -1)])
+    return Clipped(vertices, triangles, kind[triangles].max(axis=1))
 
 
 def _on_both(
-    body: Level,
-    pieces: Sequence[Level],
+    body: Levelled,
+    pieces: Sequence[Levelled],
     numbers: Callable[[FloatArray], IntArray],
     a: FloatArray,
     b: FloatArray,
@@ -163,21 +112,14 @@ def _on_both(
     halved = (~steep | far) & (ka != kb)
     low, high, first = a[halved], b[halved], ka[halved]
     for _ in range(HALVINGS):
-        at = 0.5 * (low + high)
-        for _ in range(3):
-            at = at - _step(body.level(at), body.gradient(at))
+        at = towards(body.compiled, 0.5 * (low + high), 3)
         same = (numbers(at) == first)[:, None]
         low, high = np.where(same, at, low), np.where(same, high, at)
     found[halved] = 0.5 * (low + high)
     return found
 
 
-def _step(value: FloatArray, gradient: FloatArray) -> FloatArray:
-    with np.errstate(all="ignore"):
-        return np.asarray(np.nan_to_num((value / np.sum(gradient**2, axis=-1))[..., None] * gradient))
-
-
-def _on_all(pieces: Sequence[Level], points: FloatArray, which: IntArray) -> FloatArray:
+def _on_all(pieces: Sequence[Levelled], points: FloatArray, which: IntArray) -> FloatArray:
     """Points (n, 3) moved to where the levels of their pieces (n, k) are all 0."""
     points = points.copy()
     for numbers in np.unique(which, axis=0):
@@ -191,7 +133,7 @@ def _on_all(pieces: Sequence[Level], points: FloatArray, which: IntArray) -> Flo
     return points
 
 
-def _normals(pieces: Sequence[Level], points: FloatArray, which: IntArray) -> FloatArray:
+def _normals(pieces: Sequence[Levelled], points: FloatArray, which: IntArray) -> FloatArray:
     found = np.zeros(points.shape)
     for k in np.unique(which):
         gradient = pieces[k].gradient(points[which == k])
@@ -200,35 +142,37 @@ def _normals(pieces: Sequence[Level], points: FloatArray, which: IntArray) -> Fl
     return found
 
 
-def normals(pieces: Sequence[Level], corners: FloatArray, which: IntArray) -> FloatArray:
+def normals(pieces: Sequence[Levelled], corners: FloatArray, which: IntArray) -> FloatArray:
     """Unit normals (m, 3, 3) of pieces (m,) at the corners (m, 3, 3), L, of their triangles."""
     return _normals(pieces, corners.reshape(-1, 3), np.repeat(which, 3)).reshape(corners.shape)
 
 
-def creases(pieces: Sequence[Level], clipped: Clipped, spacing: float) -> list[Crease]:
+def creases(pieces: Sequence[Levelled], clipped: Clipped, spacing: float) -> list[Crease]:
     """Edges, joints and seams along the cuts of a triangulation with this spacing, L.
 
     What is shorter than the spacing is not resolved: several pieces that meet in a point seem to have curves there.
     """
+    edges = edges_of(clipped.triangles)
+    sides = clipped.pieces[edges.sides // 3]
+    between = sides[:, 0] != sides[:, 1]
     found = []
-    for a, b in np.unique(clipped.sides, axis=0).tolist():
-        mine = np.all(clipped.sides == (a, b), axis=1)
-        for points in _chains(clipped.cuts[mine], clipped.nodes[mine], THIN * spacing):
-            if np.sum(np.linalg.norm(np.diff(points, axis=0), axis=1)) < spacing:
-                continue
-            na, nb = (_normals(pieces, points, np.full(len(points), k)) for k in (a, b))
-            turn = np.arctan2(np.linalg.norm(np.cross(na, nb), axis=-1), np.sum(na * nb, axis=-1))
-            angle = float(np.nanmax(turn))
-            kind: Literal["edge", "joint", "seam"] = "edge" if angle > EDGE else "joint"
-            # where pieces that touch end on a third one, their end is not known as well as the rest
-            within = points[1:-1] if len(points) > 2 else points
-            if kind == "joint" and not _bent(pieces[a], pieces[b], within):
-                kind = "seam"
-            found.append(Crease(kind, (a, b), points, angle if kind == "edge" else 0.0))
+    for (a, b), chain, _ in curves(edges.ends[between], sides[between], len(clipped.vertices)):
+        points = _thinned(clipped.vertices[chain], THIN * spacing)
+        if np.sum(np.linalg.norm(np.diff(points, axis=0), axis=1)) < spacing:
+            continue
+        na, nb = (_normals(pieces, points, np.full(len(points), k)) for k in (a, b))
+        turn = np.arctan2(np.linalg.norm(np.cross(na, nb), axis=-1), np.sum(na * nb, axis=-1))
+        angle = float(np.nanmax(turn))
+        kind: Literal["edge", "joint", "seam"] = "edge" if angle > EDGE else "joint"
+        # where pieces that touch end on a third one, their end is not known as well as the rest
+        within = points[1:-1] if len(points) > 2 else points
+        if kind == "joint" and not _bent(pieces[a], pieces[b], within):
+            kind = "seam"
+        found.append(Crease(kind, (a, b), points, angle if kind == "edge" else 0.0))
     return found
 
 
-def _bent(one: Level, other: Level, points: FloatArray) -> bool:
+def _bent(one: Levelled, other: Levelled, points: FloatArray) -> bool:
     """Whether the curvatures of two pieces differ somewhere along a curve."""
     of_each = []
     for piece in (one, other):
@@ -241,32 +185,16 @@ def _bent(one: Level, other: Level, points: FloatArray) -> bool:
     return bool(np.max(np.abs(of_each[0] - of_each[1])) > JUMP * largest)
 
 
-def _chains(cuts: FloatArray, nodes: IntArray, apart: float) -> list[FloatArray]:
-    """Curves (n, 3), L, of segments that share their ends, points ``apart``, L; closed ones end where they begin."""
-    places: dict[int, FloatArray] = {}
-    near: dict[int, list[int]] = {}
-    for (p, q), (a, b) in zip(cuts, nodes.tolist(), strict=True):
-        places[a], places[b] = p, q
-        near.setdefault(a, []).append(b)
-        near.setdefault(b, []).append(a)
-    found = []
-    # open curves from their ends first
-    for start in sorted(near, key=lambda node: len(near[node]) == 2):
-        while near[start]:
-            chain = [start]
-            while near[chain[-1]]:
-                following = near[chain[-1]].pop()
-                near[following].remove(chain[-1])
-                chain.append(following)
-            kept = [places[chain[0]]]
-            for node in chain[1:-1]:
-                if np.linalg.norm(places[node] - kept[-1]) > apart:
-                    kept.append(places[node])
-            found.append(np.stack([*kept, places[chain[-1]]]))
-    return found
+def _thinned(points: FloatArray, apart: float) -> FloatArray:
+    """Points (n, 3) of a curve with its ends, others left out that are nearer than that to the one before, L."""
+    kept = [0]
+    for k in range(1, len(points) - 1):
+        if np.linalg.norm(points[k] - points[kept[-1]]) > apart:
+            kept.append(k)
+    return points[[*kept, len(points) - 1]]
 
 
-def march(level: Callable[[FloatArray], FloatArray], box: FloatArray, spacing: float) -> tuple[FloatArray, IntArray]:
+def march(level: Field, box: FloatArray, spacing: float) -> tuple[FloatArray, IntArray]:
     """Points (n, 3), L, on F = 0 inside a box (2, 3) and triangles (m, 3), counter-clockwise from outside.
 
     Raises
@@ -274,14 +202,8 @@ def march(level: Callable[[FloatArray], FloatArray], box: FloatArray, spacing: f
     ValueError
         If the grid is too large, or F has no sign change on it.
     """
-    side = box[1] - box[0]
-    if np.prod(side / spacing + 4) > MOST:
-        raise ValueError(f"tiles of this size ask for a grid of more than {MOST} nodes; make them larger")
-    # the shift keeps nodes off planes of symmetry, where F is often exactly 0
-    origin = box[0] - (1 + 0.1 * np.sqrt([2.0, 3.0, 5.0])) * spacing
-    axes = [origin[k] + spacing * np.arange(int(side[k] / spacing) + 4) for k in range(3)]
-    planes = [level(np.stack(np.broadcast_arrays(x, axes[1][:, None], axes[2]), axis=-1)) for x in axes[0]]
-    inside = np.stack(planes) < 0
+    samples = sampled(level, box, spacing)
+    inside = samples.values < 0
     corners = [inside[i : i - 1 or None, j : j - 1 or None, k : k - 1 or None] for i, j, k in np.ndindex(2, 2, 2)]
     total = np.sum(corners, axis=0)
     cubes = np.argwhere((total > 0) & (total < 8))
@@ -291,50 +213,36 @@ def march(level: Callable[[FloatArray], FloatArray], box: FloatArray, spacing: f
     number = np.asarray(np.ravel_multi_index(tuple(np.moveaxis(nodes, -1, 0)), inside.shape), dtype=np.int64)
     below = inside.ravel()[number]
     count = below.sum(axis=1)
-    triangles = []
-    for wanted in (1, 2, 3):
-        mine = count == wanted
-        # nodes inside first
-        order = np.argsort(~below[mine], axis=1, kind="stable")
-        sorted_nodes = np.take_along_axis(number[mine], order, axis=1)
-        triangles.append(_cut(sorted_nodes, wanted))
-    ends = np.concatenate(triangles)
-    pairs, found = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
-    places = [np.stack(np.unravel_index(end, inside.shape), axis=-1) for end in pairs.T]
-    points = _crossings(level, *(origin + spacing * place for place in places))
-    corners_of = found.reshape(-1, 3)
-    return points, _turned(points, corners_of, ends, origin, spacing, inside.shape)
-
-
-def _cut(nodes: IntArray, inside: int) -> IntArray:
-    """Triangles (m, 3, 2), each corner by the nodes inside and outside between which it lies."""
-    a, b, c, d = nodes.T
-    if inside == 1:
-        corners = [[(a, b), (a, c), (a, d)]]
-    elif inside == 3:
-        corners = [[(a, d), (b, d), (c, d)]]
-    else:
-        corners = [[(a, c), (a, d), (b, d)], [(a, c), (b, d), (b, c)]]
-    return np.concatenate([np.stack([np.stack(pair, axis=-1) for pair in three], axis=1) for three in corners])
-
-
-def _crossings(level: Callable[[FloatArray], FloatArray], inner: FloatArray, outer: FloatArray) -> FloatArray:
-    """Zeros of F between points inside and outside, by halving."""
-    low, high = np.zeros(len(inner)), np.ones(len(inner))
-    for _ in range(MARCHING_HALVINGS):
+    # nodes inside first
+    a, b, c, d = np.take_along_axis(number, np.argsort(~below, axis=1, kind="stable"), axis=1).T
+    # each corner of a triangle by the nodes inside and outside between which it lies: (m, 3, 2)
+    ends: IntArray = np.concatenate(
+        [
+            np.stack(
+                [np.stack([one[count == wanted], other[count == wanted]], axis=-1) for one, other in pairs], axis=1
+            )
+            for wanted, pairs in (
+                (1, [(a, b), (a, c), (a, d)]),
+                (2, [(a, c), (a, d), (b, d)]),
+                (2, [(a, c), (b, d), (b, c)]),
+                (3, [(a, d), (b, d), (c, d)]),
+            )
+        ]
+    )
+    pairs, triangles = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
+    inner, outer = (
+        samples.origin + spacing * np.stack(np.unravel_index(end, inside.shape), axis=-1) for end in pairs.T
+    )
+    # by halving: F is continuous only
+    low, high = np.zeros(len(pairs)), np.ones(len(pairs))
+    for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        inside = level(inner + middle[:, None] * (outer - inner)) < 0
-        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
-    return np.asarray(inner + (0.5 * (low + high))[:, None] * (outer - inner))
-
-
-def _turned(
-    points: FloatArray, triangles: IntArray, ends: IntArray, origin: FloatArray, spacing: float, shape: tuple[int, ...]
-) -> IntArray:
-    """Triangles turned so that their normals point to the nodes outside."""
-    inner, outer = (np.stack(np.unravel_index(ends[..., k], shape), axis=-1).mean(axis=1) for k in range(2))
-    # by the middles of the grid's edges: a triangle may be a sliver, what it would be without interpolation is none
-    middle = np.stack(np.unravel_index(ends, shape), axis=-1).mean(axis=2)
-    normal = np.cross(middle[:, 1] - middle[:, 0], middle[:, 2] - middle[:, 0])
-    back = np.sum(normal * (outer - inner), axis=-1) < 0
-    return np.where(back[:, None], triangles[:, ::-1], triangles)
+        within = level(inner + middle[:, None] * (outer - inner)) < 0
+        low, high = np.where(within, middle, low), np.where(within, high, middle)
+    points = inner + (0.5 * (low + high))[:, None] * (outer - inner)
+    # normals point to the nodes outside; by the middles of the grid's edges, as a triangle may be a sliver
+    triangles = triangles.reshape(-1, 3)
+    x = (0.5 * (inner + outer))[triangles]
+    normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+    back = np.sum(normal * (outer - inner)[triangles].sum(axis=1), axis=-1) < 0
+    return points, np.where(back[:, None], triangles[:, ::-1], triangles)

@@ -21,12 +21,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Protocol
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scatterers.base.level_body import finite
+from creeping._typing import FloatArray
+from scatterers.body import finite
 from scatterers.kernels.revolved import CONIC, SPLINE
 
 OFF = 1e-9
@@ -36,52 +36,44 @@ MOST_TURN = np.pi / 2
 """Turn of the tangent between two points beyond which a profile is too coarse."""
 
 
-FloatArray = NDArray[np.float64]
 Pair = tuple[float, float]
 
 
-class Segment(Protocol):
-    """Smooth part of a profile; u runs from 0 to 1 along it."""
+class Segment:
+    """Smooth part of a profile; u runs from 0 to 1 along it, from ``start`` to ``end``, (z, radius), L."""
 
-    @property
-    def start(self) -> Pair:
-        """First point (z, radius), L."""
-        ...
-
-    @property
-    def end(self) -> Pair:
-        """Last point (z, radius), L."""
-        ...
+    start: Any
+    end: Any
 
     @property
     def turns(self) -> FloatArray:
         """Values of u (n,), from 0 to 1, between which the tangent turns by a right angle at most."""
-        ...
+        return np.array([0.0, 1.0])
 
     @property
     def extremes(self) -> FloatArray:
         """Values of u (n,) among which are those of the least and largest z and radius."""
-        ...
+        return self.turns
 
     def point(self, u: FloatArray) -> FloatArray:
         """Points (z, radius), L: (n,) to (n, 2)."""
-        ...
+        raise NotImplementedError
 
     def tangent(self, u: FloatArray) -> FloatArray:
         """Unit tangents: (n,) to (n, 2)."""
-        ...
+        raise NotImplementedError
 
     def shapes(self) -> tuple[float, list[FloatArray]]:
         """Kind, and parameters of all parts between `turns`, or of the one that all share; see `kernels.revolved`."""
-        ...
+        raise NotImplementedError
 
     def reversed(self) -> "Segment":
         """The same from its end to its start."""
-        ...
+        raise NotImplementedError
 
 
 @dataclass(frozen=True)
-class Line:
+class Line(Segment):
     """Straight segment: a cone, a cylinder, or a plane across the axis.
 
     Attributes
@@ -99,16 +91,6 @@ class Line:
 
     def __post_init__(self) -> None:
         _checked(self.start, self.end)
-
-    @property
-    def turns(self) -> FloatArray:
-        """Both ends."""
-        return np.array([0.0, 1.0])
-
-    @property
-    def extremes(self) -> FloatArray:
-        """Both ends."""
-        return self.turns
 
     def point(self, u: FloatArray) -> FloatArray:
         """Points (z, radius), L: (n,) to (n, 2)."""
@@ -131,7 +113,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Arc:
+class Arc(Segment):
     """Arc of a circle, or of an ellipse with axes along z and the radius.
 
     Attributes
@@ -199,11 +181,6 @@ class Arc:
         # an end that is a vertex but for rounding
         inner = inner[(inner > 1e-6) & (inner < 1 - 1e-6)]
         return np.concatenate([[0.0], np.sort(inner), [1.0]])
-
-    @property
-    def extremes(self) -> FloatArray:
-        """Both ends, and the conic's vertices between them."""
-        return self.turns
 
     def _angle(self, u: FloatArray) -> FloatArray:
         first, last = self._angles
@@ -289,7 +266,7 @@ def _crossing(z: FloatArray, r: FloatArray) -> Pair | None:
     return (float(a[found[0, 0], 0]), float(a[found[0, 0], 1])) if len(found) else None
 
 
-class SplineSegment:
+class SplineSegment(Segment):
     """Segment of a profile through points.
 
     Parameters
@@ -318,6 +295,7 @@ class SplineSegment:
             if pole:
                 points[row, 1] = 0.0
         self._points, self._poles = points, poles
+        self.start, self.end = (tuple(points[row].tolist()) for row in (0, -1))
         self._breaks, self._bases, self._coefficients = _fitted(points, poles)
         heading = np.unwrap(np.arctan2(*self.tangent(np.linspace(0, 1, 8 * len(points) + 1)).T[::-1]))
         at_breaks = np.interp(self.turns, np.linspace(0, 1, len(heading)), heading)
@@ -326,16 +304,6 @@ class SplineSegment:
                 f"the profile turns by {np.degrees(worst):.0f} degrees between two of its {len(points)} points; "
                 "give more points, or name the corners"
             )
-
-    @property
-    def start(self) -> Pair:
-        """First point (z, radius), L."""
-        return float(self._points[0, 0]), float(self._points[0, 1])
-
-    @property
-    def end(self) -> Pair:
-        """Last point (z, radius), L."""
-        return float(self._points[-1, 0]), float(self._points[-1, 1])
 
     @property
     def turns(self) -> FloatArray:

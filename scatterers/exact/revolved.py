@@ -21,37 +21,25 @@ Also here: charts of a body of pieces that has no edges: six over its radial map
 Sources: [C76, sec. 3-3]; Derivations, B14.
 """
 
+import itertools
 import math
-from collections.abc import Sequence
-from functools import cached_property
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scatterers.base.level_body import positive
-from scatterers.exact.body import SHARP, NoCharts, Piece, PiecewiseBody
-from scatterers.exact.profile import Segment
-from scatterers.kernels.compiled import Compiled
-from scatterers.kernels.revolved import ROWS, SPLINE, WIDTH, evaluate, numbers
-from scatterers.kernels.tensor import HEADER
-from scatterers.pieces.patch import Crease
-
-if TYPE_CHECKING:
-    from scatterers.sphere_map.star import CubeSphereAtlas
-import itertools
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cache
-from types import FunctionType
-from typing import Any, NamedTuple
-
+from creeping._typing import FloatArray, IntArray
+from scatterers.body import SHARP, Body, Crease, Levelled, NoCharts, Piece, no_charts, positive
 from scatterers.cached import cached
-from scatterers.kernels.compiled import OPTIONS
-from scatterers.kernels.revolved import value_and_gradient
-from scatterers.sphere_map.radial import RadialMap, Spine
-from scatterers.sphere_map.star import CubeSphereAtlas
+from scatterers.charts.radial import RadialMap, Spine
+from scatterers.charts.star import CubeSphereAtlas
+from scatterers.exact.profile import Segment
+from scatterers.kernels.compiled import Compiled, evaluated
+from scatterers.kernels.revolved import ROWS, SPLINE, WIDTH, evaluate, numbers, value_and_gradient
+from scatterers.kernels.tensor import HEADER
 
 SMALLEST = 1e-6
 """Turn of the tangent, radians, below which a corner is a joint, and an end on the axis no tip."""
@@ -70,15 +58,8 @@ FEWEST = 6
 """Points on a ring, however short."""
 STEEP = 1.1
 """Turn of the profile along a square, radians, at most."""
-# nodes along an axis plus four, of one cell
-ONE_CELL = 6.0
 SLACK = 0.1
 """By which the box of the map is wider than the body, in its half widths."""
-
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-Tiles = Callable[[float], tuple[FloatArray, FloatArray, NDArray[np.int64]]]
 
 
 class Squares(NamedTuple):
@@ -144,7 +125,7 @@ def _cuts(segment: Segment) -> FloatArray:
     return np.concatenate([[0.0], inner, [1.0]])
 
 
-class Revolved(PiecewiseBody):
+class Revolved(Levelled, Body):
     """Base of bodies with a profile; a subclass gives ``_profile``, and where it is placed."""
 
     # the axes of space that are u, v and w, and v over that coordinate
@@ -220,9 +201,10 @@ class Revolved(PiecewiseBody):
         """Compiled level evaluator."""
         return Compiled(evaluate, "level", self._packed(self._profile))
 
-    @cached_property
-    def _compiled_numbers(self) -> Compiled:
-        return Compiled(numbers, "level", self.compiled.parameters)
+    def piece(self, points: FloatArray) -> IntArray:
+        """Number of the piece nearest to points (..., 3), L, which lie near the body: (...)."""
+        # this level has the numbers of the pieces in the place of F
+        return evaluated(Compiled(numbers, "level", self.compiled.parameters), points)[0].astype(np.int64)
 
     @cached
     def creases(self) -> Sequence[Crease]:
@@ -315,12 +297,22 @@ class Revolved(PiecewiseBody):
         return np.asarray(n / np.linalg.norm(n, axis=-1, keepdims=True))
 
     @cached
-    def atlas(self) -> "CubeSphereAtlas | NoCharts":
+    def atlas(self) -> CubeSphereAtlas | NoCharts:
         """Six charts of a body that has neither edges nor tips and is seen whole from the middle of its box."""
-        if any(crease.kind in SHARP for crease in self.creases) or self._axes != (0, 1, 2) or self._stretch != 1:
-            return NoCharts(super().atlas.reason)
-
-        return charts(self.bounds, self.tiles, lambda of_map: self._packed(self._profile, of_map))
+        sharp = [crease for crease in self.creases if crease.kind in SHARP]
+        if sharp or self._axes != (0, 1, 2) or self._stretch != 1:
+            return no_charts(sharp)
+        half, middle = 0.5 * np.ptp(self.bounds, axis=0), self.bounds.mean(axis=0)
+        wider = np.stack([self.bounds[0] - SLACK * half, self.bounds[1] + SLACK * half])
+        space = RevolvedSpace(wider, lambda of_map: self._packed(self._profile, of_map))
+        sphere_map = RadialMap(space, middle, half, Spine.none())
+        points = self.tiles(0.05 * float(np.linalg.norm(half)))[0].reshape(-1, 3)
+        if hidden := int(np.sum(~(sphere_map.facing(points) > 0))):
+            return NoCharts(
+                f"the body is not star-shaped about the middle of its box: {hidden} of {len(points)} points are "
+                "hidden; no charts cover it, take its tiles"
+            )
+        return CubeSphereAtlas(sphere_map, sphere_map.compiled_locator)
 
 
 def _shared(tangent: FloatArray, other: FloatArray) -> FloatArray:
@@ -401,7 +393,7 @@ def strip(lower: int, upper: int) -> tuple[IntArray, IntArray]:
 
 @dataclass(frozen=True, eq=False)
 class RevolvedSpace:
-    """F of a body of revolution in a box; satisfies `scatterers.sphere_map.radial.SpaceLevel`.
+    """F of a body of revolution in a box; satisfies `scatterers.charts.radial.SpaceLevel`.
 
     Attributes
     ----------
@@ -415,8 +407,9 @@ class RevolvedSpace:
 
     def flat(self, of_map: FloatArray) -> FloatArray:
         """Parameters of the compiled functions: a grid of one cell, those of a map, those of the body."""
-        cell = [np.full(3, ONE_CELL), self.box[0], 1 / (self.box[1] - self.box[0]), of_map]
-        return self.packed(np.concatenate(cell))
+        from scatterers.kernels.sphere_maps import one_cell
+
+        return self.packed(one_cell(self.box, of_map))
 
     @property
     def sources(self) -> dict[str, Callable[..., None]]:
@@ -424,31 +417,9 @@ class RevolvedSpace:
         return {"level": evaluate, "forward": _forward()}
 
 
-def charts(bounds: FloatArray, tiles: Tiles, packed: Callable[[FloatArray], FloatArray]) -> CubeSphereAtlas | NoCharts:
-    """Six charts of a body that is seen whole from the middle of its box, none of another."""
-    half = 0.5 * (bounds[1] - bounds[0])
-    space = RevolvedSpace(np.stack([bounds[0] - SLACK * half, bounds[1] + SLACK * half]), packed)
-    sphere_map = RadialMap(space, 0.5 * (bounds[0] + bounds[1]), half, Spine.none())
-    points = tiles(0.05 * float(np.linalg.norm(half)))[0].reshape(-1, 3)
-    if hidden := int(np.sum(~(sphere_map.facing(points) > 0))):
-        return NoCharts(
-            f"the body is not star-shaped about the middle of its box: {hidden} of {len(points)} points are hidden; "
-            "no charts cover it, take its tiles"
-        )
-    return CubeSphereAtlas(sphere_map, sphere_map.compiled_locator)
-
-
 @cache
 def _forward() -> Callable[..., None]:
     """The sphere map's function on this level, the same object at every call."""
-    from numba import njit
+    from scatterers.kernels.sphere_maps import forward_over
 
-    from scatterers.kernels import radial as kernels
-
-    space: dict[str, Any] = dict(vars(kernels))
-    space["value_and_gradient"] = njit(**OPTIONS)(value_and_gradient)
-    for name in ("_at", "_radius"):
-        space[name] = njit(**OPTIONS)(FunctionType(space[name].py_func.__code__, space, name))
-    # a file that does not exist: numba must not take the code that it keeps for splines
-    code = kernels.forward.__code__.replace(co_filename="<body of revolution>")
-    return FunctionType(code, space, "forward")
+    return forward_over(value_and_gradient, "body of revolution")

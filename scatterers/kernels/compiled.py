@@ -8,6 +8,8 @@ of unit length.
 Parameters arrive in an array, so one compiled function serves every body of its class and is cached on disk.
 numba is imported at the first use, for a quick start: plain Python that several of them call is marked by `helper`.
 
+Python calls them through `evaluated`, `mapped` and `inverted`: there is no second, numpy version of a body.
+
 Also here: compiled block functions as kernels take them, with their numba type known beforehand.
 
 numba finds the type of a function that is an argument anew at each call, by its signature: half of the time of a call
@@ -21,13 +23,13 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 import numpy as np
-from numba import types
+from numba import njit, types
 
 # registers how numba passes such functions; else it does that itself after a first failure
 from numba.experimental import function_type as _function_type  # noqa: F401
 from numba.extending import typeof_impl
-from numpy.typing import NDArray
 
+from creeping._typing import FloatArray
 from creeping.kernels.cache import discard_stale
 from creeping.kernels.private_cache import keep_private
 
@@ -36,6 +38,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 CLOSED_FORM = 50.0
 """Operations of the level of a quadric."""
+SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
+"""Where xx, yy, zz, yz, xz, xy stand in a matrix."""
 
 
 Kind = Literal["level", "locator", "forward", "inverse"]
@@ -74,7 +78,7 @@ class Compiled:
 
     source: Callable[..., None]
     kind: Kind
-    parameters: NDArray[np.float64]
+    parameters: FloatArray
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
         make, *arguments = getattr(self.source, "again", (Compiled, self.source))
@@ -130,6 +134,43 @@ class BlockFunction(types.WrapperAddressProtocol):  # type: ignore[misc]
     def __wrapper_address__(self) -> int:
         """Address, for numba."""
         return self._address
+
+
+@njit(cache=True)
+def call(function, *blocks):  # type: ignore[no-untyped-def]
+    """Fill one block by a compiled function, which Python itself cannot call."""
+    function(*blocks)
+
+
+def _columns(points: FloatArray) -> tuple[FloatArray, tuple[int, ...]]:
+    """Points (..., 3) as the columns (3, n) of a block, and the shape (...)."""
+    points = np.asarray(points, dtype=float)
+    return np.ascontiguousarray(points.reshape(-1, 3).T), points.shape[:-1]
+
+
+def evaluated(compiled: Compiled, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """F (...), its gradient (..., 3) and Hessian entries (..., 6), xx, yy, zz, yz, xz, xy, of a compiled level."""
+    columns, shape = _columns(points)
+    n = columns.shape[1]
+    values, gradients, hessians = np.empty(n), np.empty((3, n)), np.empty((6, n))
+    call(compiled.function, columns, values, gradients, hessians, compiled.parameters)
+    return values.reshape(shape), gradients.T.reshape(*shape, 3), hessians.T.reshape(*shape, 6)
+
+
+def mapped(compiled: Compiled, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Points (..., 3) and derivatives (..., 3, 3) of a compiled forward map."""
+    columns, shape = _columns(s)
+    points, derivatives = np.empty_like(columns), np.empty((9, columns.shape[1]))
+    call(compiled.function, columns, points, derivatives, compiled.parameters)
+    return points.T.reshape(*shape, 3), derivatives.T.reshape(*shape, 3, 3)
+
+
+def inverted(compiled: Compiled, points: FloatArray) -> FloatArray:
+    """What a compiled inverse map makes of points (..., 3)."""
+    columns, shape = _columns(points)
+    found = np.empty_like(columns)
+    call(compiled.function, columns, found, compiled.parameters)
+    return found.T.reshape(*shape, 3)
 
 
 @typeof_impl.register(BlockFunction)  # type: ignore[untyped-decorator]

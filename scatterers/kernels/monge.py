@@ -1,4 +1,4 @@
-"""Compiled parts of `scatterers.atlas.monge.atlas`: the locator, and the growth of charts; importing it imports numba.
+"""Compiled parts of `scatterers.charts.monge`: the locator, and the growth of charts; importing it imports numba.
 
 A chart grows over a graph of points of the body from its centre, in the order of rho = max(|q.E1|, |q.E2|),
 q = x - x0, so that it never leaps to another sheet over the same square. It ends before the first point with
@@ -20,21 +20,13 @@ import numpy as np
 from numba import njit
 
 from scatterers.kernels.compiled import OPTIONS
+from scatterers.kernels.tensor import voxel_place
 
 ORIGIN, PER_SIDE, SHAPE, VOXELS, LEAN, OUTSIDE = 0, 3, 4, 7, 8, 9
 FIRST = 10
 CHART = 15
 # added to the score of a chart that is not valid
 BEHIND = 1e3
-
-
-@njit(**OPTIONS)
-def _place(x, origin, per_side, count):  # type: ignore[no-untyped-def]
-    """Voxel along one axis, the nearest for a point outside."""
-    # comparisons with NaN are false, so a NaN lands in voxel 0 and no undefined cast is made
-    g = (x - origin) * per_side
-    g = g if g > 0.0 else 0.0
-    return int(g if g < count - 1.0 else count - 1.0)
 
 
 @njit(**OPTIONS)
@@ -45,7 +37,7 @@ def _bounded(t, beyond):  # type: ignore[no-untyped-def]
 
 
 def locate(points, gradients, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]
-    """Chart, chart variables and polar frame of a block; the compiled twin of locate and polar_frame.
+    """Chart, chart variables and polar frame of a block.
 
     Where no chart is valid, the one with the least max(|u - 1/2|, |v - 1/2|), else chart 0, with bounded u and v.
     """
@@ -55,11 +47,11 @@ def locate(points, gradients, chart, uv, frame, parameters):  # type: ignore[no-
         nx, ny, nz = gradients[0, i], gradients[1, i], gradients[2, i]
         scale = 1.0 / math.sqrt(nx * nx + ny * ny + nz * nz)
         nx, ny, nz = nx * scale, ny * scale, nz * scale
-        cell = _place(x, parameters[ORIGIN], parameters[PER_SIDE], parameters[SHAPE])
+        cell = voxel_place(x, parameters[ORIGIN], parameters[PER_SIDE], parameters[SHAPE])
         cell = cell * int(parameters[SHAPE + 1])
-        cell += _place(y, parameters[ORIGIN + 1], parameters[PER_SIDE], parameters[SHAPE + 1])
+        cell += voxel_place(y, parameters[ORIGIN + 1], parameters[PER_SIDE], parameters[SHAPE + 1])
         cell = cell * int(parameters[SHAPE + 2])
-        cell += _place(z, parameters[ORIGIN + 2], parameters[PER_SIDE], parameters[SHAPE + 2])
+        cell += voxel_place(z, parameters[ORIGIN + 2], parameters[PER_SIDE], parameters[SHAPE + 2])
         entry = int(parameters[voxels + cell])
         count = int(parameters[entry])
         number = int(parameters[entry + 1]) if count > 0 else 0

@@ -24,9 +24,7 @@ Sources: [C76, sec. 3-3].
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from creeping._typing import FloatArray
 from scatterers.kernels.compiled import helper
 from scatterers.kernels.tensor import HEADER
 
@@ -38,9 +36,6 @@ START, START_TANGENT, END, END_TANGENT, PIECE, KIND, SHAPE, CORNER, WIDTH = 0, 2
 CONIC, SPLINE = 0.0, 1.0
 TINY = 1e-300
 NEWTON = 12
-
-
-FloatArray = NDArray[np.float64]
 
 
 @helper

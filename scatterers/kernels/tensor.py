@@ -5,15 +5,24 @@ derivatives are T_op . w^(q), q = order - o - p at most. Weights are Horner sums
 point costs 36 loads and, for order 2, 144 multiply-adds before the ten dot products. Importing this module imports
 numba.
 
-Also here: constants that the quintic spline and the radial map over it share with their compiled twins.
+Also here: constants that the quintic spline and the radial map over it share.
 
-Compiled S D S of a grid, S from values at nodes to coefficients of B-splines; see `scatterers.spline.tensor`.
+Compiled S D S of a grid, S from values at nodes to coefficients of B-splines; see `scatterers.fits.tensor`.
 
 B = L diag(d) L^T along each axis, L with ones on its diagonal and two bands below it: S takes a sweep down and one up,
 x_i - l_i x_(i-1) - m_i x_(i-2), then x_i/d_i - l_(i+1) x_(i+1) - m_(i+2) x_(i+2). The axes commute, so S D S takes
 three passes over the grid, of slabs that stay in the cache: the last two axes; the first one, D, the first one; the
 last two. In between the last two axes are exchanged, so that every sweep takes whole rows at a time.
 Factors are (3, n): l, m and 1/d. Importing this module imports numba.
+
+Also here: compiled level of a body of pieces, each a quintic tensor-product B-spline; see `scatterers.fits.selection`.
+
+Voxels have programs in postfix order: the number of a piece asks for its F, -1 takes the larger of the last two values,
+-2 the smaller; -3 takes the last one where a.x > b, else the one before, a (3) and b standing behind it.
+
+Parameters: origin of the voxels (3), 1/side, their numbers along the axes (3), where the table of voxels begins, where
+that of the pieces does; the table gives for each voxel the place of its program, which stands behind its length; that
+of the pieces gives the place of the parameters of each spline.
 
 Sources: [B78]; Derivations, B7 and B6.
 """
@@ -247,7 +256,7 @@ def second_derivatives(x, y, z, parameters):  # type: ignore[no-untyped-def]
 
 
 def evaluate(points, values, gradients, hessians, parameters):  # type: ignore[no-untyped-def]
-    """F, grad F and Hessian of a block; the compiled twin of `TensorSpline`."""
+    """F, grad F and Hessian of a block."""
     for i in range(points.shape[1]):
         found = second_derivatives(points[0, i], points[1, i], points[2, i], parameters)
         values[i] = found[0]
@@ -259,12 +268,6 @@ def evaluate(points, values, gradients, hessians, parameters):  # type: ignore[n
 
 # 216 coefficients into ten sums, axis by axis: what the compiler makes of it takes as long as so many operations
 evaluate.operations = 1250.0  # type: ignore[attr-defined]
-
-
-@njit(cache=True)
-def call(function, points, values, gradients, hessians, parameters):  # type: ignore[no-untyped-def]
-    """Fill one block by a compiled level, which Python itself cannot call."""
-    function(points, values, gradients, hessians, parameters)
 
 
 @njit(cache=True, nogil=True, **OPTIONS)
@@ -346,3 +349,76 @@ def _solve(factors, x):  # type: ignore[no-untyped-def]
         row, before, second = x[i], x[i + 1], x[i + 2]
         for k in range(m):
             row[k] = row[k] * scale - near * before[k] - far * second[k]
+
+
+LARGER, SMALLER, BESIDES = -1, -2, -3
+"""Of the last two values, in a program; the last names a plane."""
+MOST_PIECES = 8
+"""Values that a program holds at a time."""
+TABLES = 9
+"""Parameters before the tables."""
+
+
+@njit(**OPTIONS)
+def voxel_place(x, origin, per_side, count):  # type: ignore[no-untyped-def]
+    """Voxel along one axis, the nearest for a point outside."""
+    # comparisons with NaN are false, so a NaN lands in voxel 0 and no undefined cast is made
+    g = (x - origin) * per_side
+    g = g if g > 0.0 else 0.0
+    return int(g if g < count - 1.0 else count - 1.0)
+
+
+@njit(**OPTIONS)
+def chosen(x, y, z, parameters):  # type: ignore[no-untyped-def]
+    """Number of the piece whose F is that of the body at a point."""
+    cell = voxel_place(x, parameters[0], parameters[3], parameters[4])
+    cell = cell * int(parameters[5]) + voxel_place(y, parameters[1], parameters[3], parameters[5])
+    cell = cell * int(parameters[6]) + voxel_place(z, parameters[2], parameters[3], parameters[6])
+    entry = int(parameters[int(parameters[7]) + cell])
+    length, number = int(parameters[entry]), int(parameters[entry + 1])
+    if length == 1:
+        return number
+    pieces, height = int(parameters[8]), 0
+    values, numbers = np.empty(MOST_PIECES), np.empty(MOST_PIECES, np.int64)
+    k, end = entry + 1, entry + 1 + length
+    while k < end:
+        token = int(parameters[k])
+        k += 1
+        if token >= 0:
+            own = parameters[int(parameters[pieces + token]) :]
+            values[height], numbers[height] = value_and_gradient(x, y, z, own)[0], token
+            height += 1
+            continue
+        height -= 1
+        if token == BESIDES:
+            last = parameters[k] * x + parameters[k + 1] * y + parameters[k + 2] * z > parameters[k + 3]
+            k += 4
+        else:
+            last = (values[height] > values[height - 1]) == (token == LARGER)
+        if last:
+            values[height - 1], numbers[height - 1] = values[height], numbers[height]
+    return numbers[0]
+
+
+def evaluate_pieces(points, values, gradients, hessians, parameters):  # type: ignore[no-untyped-def]
+    """F, grad F and Hessian of a block of points."""
+    pieces = int(parameters[8])
+    for i in range(points.shape[1]):
+        x = points[0, i], points[1, i], points[2, i]
+        number = chosen(*x, parameters)
+        found = second_derivatives(*x, parameters[int(parameters[pieces + number]) :])
+        values[i] = found[0]
+        for k in range(3):
+            gradients[k, i] = found[1 + k]
+        for k in range(6):
+            hessians[k, i] = found[4 + k]
+
+
+evaluate_pieces.operations = 1400.0  # type: ignore[attr-defined]
+
+
+@njit(cache=True)
+def piece_numbers(points, found, parameters):  # type: ignore[no-untyped-def]
+    """Fill the numbers of the pieces at points (n, 3)."""
+    for i in range(len(points)):
+        found[i] = chosen(points[i, 0], points[i, 1], points[i, 2], parameters)

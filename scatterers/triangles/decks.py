@@ -15,7 +15,8 @@ from collections.abc import Callable, Iterator
 from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
+
+from creeping._typing import FloatArray, IntArray
 
 CORNERS = {2: 3, 3: 4}
 """Nodes of the triangles and quadrangles of MSH files, by their kinds."""
@@ -68,7 +69,7 @@ COMMA = re.compile(
 EXPONENT = re.compile(rb"(?<!\S)([-+]?(?:\d+\.?\d*|\.\d+))[dD]([-+]?\d+)(?!\S)")
 
 
-Read = tuple[NDArray[np.float64], NDArray[np.int64]]
+Read = tuple[FloatArray, IntArray]
 
 Note = Callable[[str], None]
 

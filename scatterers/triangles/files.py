@@ -14,14 +14,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from creeping._typing import FloatArray, IntArray
 from scatterers.triangles.decks import read_bdf, read_medit, read_msh, understood
 from scatterers.triangles.form import check_whole, uncrossed
 from scatterers.triangles.parts import every_part
 from scatterers.triangles.quality import Choice, silent, whole_body
 from scatterers.triangles.subdivision import Subdivision
-from scatterers.triangles.threemf import read_3mf, with_triangles
+from scatterers.triangles.threemf import Placed, assembled, read_3mf, with_triangles
 from scatterers.triangles.topology import cleaned, crossings, oriented
 
 DECKS = {".msh": read_msh, ".bdf": read_bdf, ".mesh": read_medit}
@@ -39,10 +39,6 @@ FAR = 100.0
 """Sizes from the origin beyond which a body is brought back: there differences of coordinates lose digits."""
 COARSEST_ROUNDING = 1e-3
 """Rounding of the coordinates, in mean edges, from which on curvatures are those of the rounding."""
-
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,32 +281,17 @@ def _loaded(
             resolver=_Nothing(),
             **split,
         )
-    vertices, triangles, count = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0
-    names = []
     stated = {getattr(geometry, "units", None) for geometry in scene.geometry.values()}
-    placed = 0
-    for node in scene.graph.nodes_geometry:
-        matrix, key = scene.graph[node]
-        # each placement repeats its triangles
-        placed += len(getattr(scene.geometry[key], "faces", ()))
-        if placed > MOST_TRIANGLES:
-            raise ValueError(f"its meshes, each where it is placed, have more than {MOST_TRIANGLES} triangles")
-        if len(getattr(scene.geometry[key], "faces", ())):
-            points = np.array(scene.geometry[key].vertices, dtype=float)
-            corners = np.array(scene.geometry[key].faces, dtype=np.int64)
-            if corners.min() < 0 or corners.max() >= len(points):
-                raise ValueError(f"a triangle refers to vertex {corners.max()} of {len(points)}")
-            if not np.array_equal(matrix, np.eye(4)):
-                points = points @ matrix[:3, :3].T + matrix[:3, 3]
-                # a placement that mirrors turns the triangles inside out
-                corners = corners if np.linalg.det(matrix[:3, :3]) > 0 else corners[:, ::-1]
-            vertices.append(points)
-            triangles.append(corners + count)
-            names.append((str(key), len(corners)))
-            count += len(points)
     unit = stated.pop() if len(stated) == 1 and suffix == ".glb" else None
-    unit = unit or ("m" if suffix == ".glb" else None)
-    return np.concatenate(vertices), np.concatenate(triangles), unit, tuple(names)
+
+    def placed() -> Iterator[Placed]:
+        for node in scene.graph.nodes_geometry:
+            matrix, key = scene.graph[node]
+            geometry = scene.geometry[key]
+            yield str(key), getattr(geometry, "vertices", ()), getattr(geometry, "faces", ()), matrix
+
+    vertices, triangles, names = assembled(placed(), MOST_TRIANGLES)
+    return vertices, triangles, unit or ("m" if suffix == ".glb" else None), names
 
 
 def _check_numbers(raw: _Raw) -> None:

@@ -14,20 +14,21 @@ import re
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from creeping._typing import FloatArray, IntArray
 from scatterers.triangles.parts import areas, capped, compact, parts_of, taken_apart
+from scatterers.triangles.quality import silent
 from scatterers.triangles.topology import KEPT, crossings, edges_of, oriented
 
 PLY_BYTES = {
     name: size
-    for size, names in {
-        1: (b"char", b"uchar", b"int8", b"uint8"),
-        2: (b"short", b"ushort", b"int16", b"uint16"),
-        4: (b"int", b"uint", b"float", b"int32", b"uint32", b"float32"),
-        8: (b"double", b"float64", b"int64", b"uint64"),
-    }.items()
-    for name in names
+    for size, names in (
+        (1, b"char uchar int8 uint8"),
+        (2, b"short ushort int16 uint16"),
+        (4, b"int uint float int32 uint32 float32"),
+        (8, b"double float64 int64 uint64"),
+    )
+    for name in names.split()
 }
 """Sizes of the numbers of a binary PLY."""
 ROUNDS = 6
@@ -35,8 +36,6 @@ MOST_CUT = 0.1
 """Share of the area that may be cut out."""
 
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Note = Callable[[str], None]
 
 
@@ -252,20 +251,16 @@ def _closed(
     name: str, vertices: FloatArray, triangles: IntArray, largest: float, scale: float
 ) -> tuple[FloatArray, IntArray] | None:
     """The largest part with its holes closed, None if it is not closed then."""
-    x, t = taken_apart(name, vertices, triangles, _silent)
+    x, t = taken_apart(name, vertices, triangles, silent)
     part = parts_of(x, t)
     size = areas(x, t)
     if float(size[part > 0].sum()) > MOST_CUT * float(size.sum()):
         return None
     x, t = compact(x, t[part == 0])
-    x, t = capped(name, x, t, largest, scale, _silent)
+    x, t = capped(name, x, t, largest, scale, silent)
     if np.any(edges_of(t).faces != 2):
         return None
     try:
-        return x, oriented(name, x, t, _silent)
+        return x, oriented(name, x, t, silent)
     except ValueError:
         return None
-
-
-def _silent(_: str) -> None:
-    """Note of what is told as a whole."""

@@ -20,7 +20,8 @@ Sources: Derivations, B5.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from creeping._typing import BoolArray, FloatArray, IntArray
 
 NEIGHBOURS = 56
 """Twice the terms of degree 6: enough to show in the residual what the jet misses."""
@@ -37,10 +38,6 @@ JET_POINTS_SHARE = 20_000
 """Triangles treated at a time."""
 # powers of u and v in the order of `Jets.coefficients`
 POWERS = [(d - b, b) for d in range(1, 7) for b in range(d + 1)]
-
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +67,7 @@ class Jets:
         Of u, v, uu, uv, vv, uuu, ...: by degree, powers of u falling.
     """
 
-    fitted: NDArray[np.bool_]
+    fitted: BoolArray
     normals: FloatArray
     principal: FloatArray
     principal4: FloatArray
@@ -114,7 +111,7 @@ def osculating_jets(vertices: FloatArray, triangles: IntArray) -> Jets:
     >>> bool(np.all(abs(jets.gaussian - 1) < 1e-3))
     True
     """
-    from scatterers.kernels.jets import TERMS, fit
+    from scatterers.kernels.least_squares import TERMS, fit
 
     vertices = np.ascontiguousarray(vertices, dtype=float)
     guess = angle_weighted_normals(vertices, triangles)

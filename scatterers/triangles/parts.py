@@ -18,9 +18,9 @@ import importlib.util
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scatterers.triangles.topology import Edges, components, edges_of, oriented
+from creeping._typing import BoolArray, FloatArray, IntArray
+from scatterers.triangles.topology import Edges, components, edges_of, flat_normals, oriented, umbrellas
 
 LISTED = 8
 """Parts that an error lists."""
@@ -28,8 +28,6 @@ MOST_SHARED = 100_000
 """Edges of more than two triangles beyond which a mesh is soup, and left as it is."""
 
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Note = Callable[[str], None]
 
 
@@ -223,8 +221,7 @@ def united(
 
 def areas(vertices: FloatArray, triangles: IntArray) -> FloatArray:
     """Areas (m,) of triangles."""
-    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
-    return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
+    return flat_normals(vertices[triangles])[1]
 
 
 def taken_apart(name: str, vertices: FloatArray, triangles: IntArray, note: Note) -> tuple[FloatArray, IntArray]:
@@ -245,14 +242,9 @@ def taken_apart(name: str, vertices: FloatArray, triangles: IntArray, note: Note
     if len(shared) > MOST_SHARED:
         return vertices, triangles
     left, right, parted = _joined(vertices, triangles, edges, shared)
-    # a corner is followed by its edge: the ends of that of both triangles are the same places
-    after = _next(left), _next(right)
-    same = edges.forward[left] == edges.forward[right]
-    starts = np.concatenate([left, after[0]])
-    ends = np.concatenate([np.where(same, right, after[1]), np.where(same, after[1], right)])
-    umbrellas, label = components(triangles.size, starts, ends)
+    count, label = umbrellas(edges, left, right)
     used = np.unique(triangles)
-    if umbrellas <= len(used):
+    if count <= len(used):
         return vertices, triangles
     _, first = np.unique(label, return_index=True)
     old = triangles.ravel()[first]
@@ -293,7 +285,7 @@ def _angles(vertices: FloatArray, triangles: IntArray, ends: IntArray, corners: 
     return np.asarray(np.arctan2(across @ np.cross(along, across[0]), across @ across[0]) % (2 * np.pi))
 
 
-def _pairs(angle: FloatArray, forward: NDArray[np.bool_], sheet: IntArray) -> IntArray:
+def _pairs(angle: FloatArray, forward: BoolArray, sheet: IntArray) -> IntArray:
     """Pairs (k, 2) of triangles about an edge that belong together; what is left over has an open edge there.
 
     First those of one sheet, then those between which the body is, one within the other, then the flattest.
@@ -322,7 +314,3 @@ def _pairs(angle: FloatArray, forward: NDArray[np.bool_], sheet: IntArray) -> In
     flat = [(abs(abs(angle[i] - angle[j]) - np.pi), i, j) for i in left for j in left if forward[i] > forward[j]]
     take([(i, j) for _, i, j in sorted(flat)])
     return np.array(found, dtype=np.int64).reshape(-1, 2)
-
-
-def _next(corner: IntArray) -> IntArray:
-    return corner - corner % 3 + (corner + 1) % 3

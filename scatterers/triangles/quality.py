@@ -24,14 +24,14 @@ Sources: Derivations, B5.
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.triangles.jets import Jets, angle_weighted_normals
 from scatterers.triangles.parts import capped, chosen_part, taken_apart, united
-from scatterers.triangles.topology import cleaned, oriented
+from scatterers.triangles.topology import cleaned, edges_of, flat_normals, oriented
 
 BAD = 0.03
 ASTRAY = 0.5
@@ -53,23 +53,7 @@ FEWEST_RIMS, JUMPS_ALONG = 6, 0.5
 """Vertices that make a rim; jumps, in roots of the number of vertices, that make a curve over the body."""
 
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Verdict = Literal["smooth", "noisy", "sharp", "curvature jumps", "too coarse"]
-
-
-class Mesh(Protocol):
-    """What `assess` asks of a mesh."""
-
-    @property
-    def vertices(self) -> FloatArray:
-        """Vertices (n, 3), m."""
-        ...
-
-    @property
-    def triangles(self) -> IntArray:
-        """Vertex numbers (m, 3)."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +112,7 @@ class MeshQuality:
         return f"MeshQuality({self.verdict}: {self.vertices} vertices, {self.bad_share:.2%} bad)\n{self.reasons}"
 
     @property
-    def bad(self) -> NDArray[np.bool_]:
+    def bad(self) -> BoolArray:
         """Which vertices are bad (n,)."""
         return self.badness > BAD
 
@@ -181,9 +165,8 @@ def _metres(size: FloatArray) -> str:
     return " x ".join(f"{v:.4g}" for v in size) + " m"
 
 
-def assess(mesh: Mesh, jets: Jets) -> MeshQuality:
-    """Judge a closed, oriented mesh by its jets."""
-    vertices, triangles = mesh.vertices, mesh.triangles
+def assess(vertices: FloatArray, triangles: IntArray, jets: Jets) -> MeshQuality:
+    """Judge a closed, oriented mesh (n, 3), m, and (m, 3) by its jets."""
     corners = vertices[triangles]
     length = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=-1)
     edge = float(length.mean())
@@ -221,7 +204,7 @@ def assess(mesh: Mesh, jets: Jets) -> MeshQuality:
     return MeshQuality(**quality, verdict=verdict, reasons=reasons)
 
 
-def jumps_at(jets: Jets, edge: float) -> NDArray[np.bool_]:
+def jumps_at(jets: Jets, edge: float) -> BoolArray:
     """Vertices (n,) at which the curvature jumps, by jets on a mesh with this mean edge, L."""
     curvature, doubt = np.abs(jets.principal).max(axis=1), _doubt(jets)
     _, fourth, sixth = np.maximum(jets.residuals, ROUNDING * edge).T
@@ -298,15 +281,13 @@ def _rims(ends: IntArray, angles: FloatArray, count: int) -> int:
 
 def _dihedrals(vertices: FloatArray, triangles: IntArray) -> tuple[IntArray, FloatArray]:
     """Edges (k, 2) and the angles between their triangles (k,), degrees; small ones are left out."""
-    corners = vertices[triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    first, last = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    order = np.lexsort((np.maximum(first, last), np.minimum(first, last))).reshape(-1, 2)
-    left, right = normal[order[:, 0] // 3], normal[order[:, 1] // 3]
-    angle = np.arctan2(np.linalg.norm(np.cross(left, right), axis=1), np.sum(left * right, axis=1))
-    area = np.minimum(np.linalg.norm(left, axis=1), np.linalg.norm(right, axis=1))
-    solid = area > SLIVER * np.median(np.linalg.norm(normal, axis=1))
-    return np.stack([first, last], axis=1)[order[solid, 0]], np.degrees(angle[solid])
+    edges = edges_of(triangles)
+    normal, area = flat_normals(vertices[triangles])
+    left, right = edges.sides.T // 3
+    across = np.linalg.norm(np.cross(normal[left], normal[right]), axis=1)
+    angle = np.arctan2(across, np.sum(normal[left] * normal[right], axis=1))
+    solid = np.minimum(area[left], area[right]) > SLIVER * np.median(area)
+    return edges.ends[solid], np.degrees(angle[solid])
 
 
 @dataclass(frozen=True)
@@ -339,8 +320,6 @@ class Choice:
             raise ValueError(f'part = {part!r}; give "largest", a number from 1, or a name of the file')
         if cap is not None and (isinstance(cap, bool) or not isinstance(cap, (int, float)) or not cap > 0):
             raise ValueError(f"cap = {cap!r} is no size in m; give that of the largest hole to be closed, inf for all")
-        if not isinstance(self.union, bool):
-            raise ValueError(f"union = {self.union!r} is neither True nor False")
         if isinstance(times, bool) or times not in (None, "auto", 1, 2, 3):
             raise ValueError(f'subdivide = {times!r}; give 1, 2 or 3 times, or "auto"')
 

@@ -20,12 +20,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from creeping._typing import FloatArray, IntArray
 from scatterers.triangles.topology import edges_of
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Note = Callable[[str], None]
 BLIND = 1.5
 """kappa_n(e) e beyond which a mesh shows nothing of the curvature, radians."""

@@ -12,11 +12,13 @@ A face of n corners becomes n - 2 triangles about one of them from which all of 
 import io
 import zipfile
 from collections import defaultdict
+from collections.abc import Iterable, Iterator
 from typing import Any
 from xml.parsers import expat
 
 import numpy as np
-from numpy.typing import NDArray
+
+from creeping._typing import FloatArray, IntArray
 
 PART = "3d/3dmodel.model"
 DEEPEST = 16
@@ -24,12 +26,11 @@ MOST_PARTS = 1000
 MOST_CORNERS = 4
 
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-Read = tuple[FloatArray, IntArray, str, tuple[tuple[str, int], ...]]
+Names = tuple[tuple[str, int], ...]
+Placed = tuple[str, Any, Any, FloatArray]
 
 
-def read_3mf(data: bytes, limit: int, most_triangles: int) -> Read:
+def read_3mf(data: bytes, limit: int, most_triangles: int) -> tuple[FloatArray, IntArray, str, Names]:
     """Vertices (n, 3) in the file's unit, triangles (m, 3), the unit's name, and the parts: name and triangles of each.
 
     A part has the name of its object, else that of the object that it is a component of, else "object" and its number.
@@ -49,7 +50,8 @@ def read_3mf(data: bytes, limit: int, most_triangles: int) -> Read:
         raise ValueError(f"its model is broken XML ({error})") from None
     except KeyError as error:
         raise ValueError(f"an element of its model lacks the attribute {error}") from None
-    return model.placed(most_triangles)
+    vertices, triangles, names = assembled(model.placed(), most_triangles)
+    return vertices, triangles, model.unit, names
 
 
 def _part(data: bytes, limit: int) -> bytes:
@@ -105,12 +107,10 @@ class _Model:
                 placed = (attributes["objectid"], _matrix(attributes.get("transform")))
                 (self.items if kind == "item" else self.components[self.object]).append(placed)
 
-    def placed(self, most_triangles: int) -> Read:
-        """All objects that are built, each where it is put."""
-        vertices, triangles, count = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0
+    def placed(self) -> Iterator[Placed]:
+        """All objects that are built: name, vertices, triangles, and the matrix by which they are put."""
         waiting = [(name, matrix, 0, "") for name, matrix in self.items]
-        parts, repeated = 0, 0
-        names: list[tuple[str, int]] = []
+        parts = 0
         while waiting:
             name, matrix, depth, above = waiting.pop()
             own = self.names.get(name, above)
@@ -118,23 +118,39 @@ class _Model:
             inside = self.components.get(name, [])
             if depth > DEEPEST or parts + len(waiting) + len(inside) > MOST_PARTS:
                 raise ValueError(f"its components are nested deeper than {DEEPEST} or more than {MOST_PARTS}")
-            # each placement repeats its triangles
-            repeated += len(self.triangles.get(name, ()))
-            if repeated > most_triangles:
-                raise ValueError(f"its objects, each where it is placed, have more than {most_triangles} triangles")
             waiting += [(inner, np.asarray(m @ matrix), depth + 1, own) for inner, m in inside]
-            if self.triangles.get(name):
-                points = np.array(self.vertices.get(name, []), dtype=float).reshape(-1, 3)
-                corners = np.array(self.triangles[name], dtype=np.int64)
-                if corners.min() < 0 or corners.max() >= len(points):
-                    raise ValueError(f"a triangle of object {name} refers to a vertex beyond its {len(points)}")
-                vertices.append(points @ matrix[:3, :3] + matrix[3, :3])
-                # a placement that mirrors turns the triangles inside out
-                corners = corners if np.linalg.det(matrix[:3, :3]) > 0 else corners[:, ::-1]
-                triangles.append(corners + count)
-                names.append((own or f"object {name}", len(corners)))
-                count += len(points)
-        return np.concatenate(vertices), np.concatenate(triangles), self.unit, tuple(names)
+            yield own or f"object {name}", self.vertices.get(name, []), self.triangles.get(name, []), matrix.T
+
+
+def assembled(parts: Iterable[Placed], most: int) -> tuple[FloatArray, IntArray, Names]:
+    """Vertices (n, 3) and triangles (m, 3) of parts, each where it is placed, with names and numbers of triangles.
+
+    Raises
+    ------
+    ValueError
+        If there are more than ``most`` triangles, before they are made, or one refers to a vertex that does not exist.
+    """
+    vertices, triangles, count, placed = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0, 0
+    names = []
+    for name, own, faces, matrix in parts:
+        # each placement repeats its triangles
+        placed += len(faces)
+        if placed > most:
+            raise ValueError(f"its parts, each where it is placed, have more than {most} triangles")
+        if not len(faces):
+            continue
+        points, corners = np.array(own, dtype=float).reshape(-1, 3), np.array(faces, dtype=np.int64)
+        if corners.min() < 0 or corners.max() >= len(points):
+            raise ValueError(f"a triangle of {name} refers to vertex {corners.max()} of {len(points)}")
+        if not np.array_equal(matrix, np.eye(4)):
+            points = points @ matrix[:3, :3].T + matrix[:3, 3]
+            # a placement that mirrors turns the triangles inside out
+            corners = corners if np.linalg.det(matrix[:3, :3]) > 0 else corners[:, ::-1]
+        vertices.append(points)
+        triangles.append(corners + count)
+        names.append((name, len(corners)))
+        count += len(points)
+    return np.concatenate(vertices), np.concatenate(triangles), tuple(names)
 
 
 def _matrix(text: str | None) -> FloatArray:
@@ -188,7 +204,7 @@ def with_triangles(data: bytes, most: int) -> bytes:
     return b"\n".join(b" ".join(row) for row in [*states, *lines[begin : begin + vertices], *split]) + b"\n"
 
 
-def _turned(face: list[bytes], points: NDArray[np.float64], number: int) -> list[bytes]:
+def _turned(face: list[bytes], points: FloatArray, number: int) -> list[bytes]:
     """The corners of a face, begun with one about which no triangle is turned over."""
     places = np.array([int(word) for word in face])
     if places.max() >= len(points):

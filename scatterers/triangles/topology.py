@@ -18,7 +18,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from creeping._typing import BoolArray, FloatArray, IntArray
 
 CLOSE = (1e-6, 1e-5, 1e-4)
 """Distance of vertices on open edges that are merged, in diagonals of the body: single precision, and a few digits."""
@@ -28,8 +29,6 @@ KEPT = 1000
 """Pairs that are returned at most."""
 
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Note = Callable[[str], None]
 
 
@@ -51,7 +50,19 @@ class Edges(NamedTuple):
     ends: IntArray
     faces: IntArray
     number: IntArray
-    forward: NDArray[np.bool_]
+    forward: BoolArray
+
+    @property
+    def sides(self) -> IntArray:
+        """Corners (e, 2) of a closed mesh that the edges follow, in the triangles on both sides."""
+        return np.argsort(self.number, kind="stable").reshape(-1, 2)
+
+
+def flat_normals(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Unit normals (m, 3) and areas (m,) of triangles (m, 3, 3); 0 where they have none."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    twice = np.linalg.norm(normal, axis=1)
+    return normal / np.maximum(twice, 1e-300)[:, None], 0.5 * twice
 
 
 def edges_of(triangles: IntArray) -> Edges:
@@ -157,7 +168,7 @@ def oriented(name: str, vertices: FloatArray, triangles: IntArray, note: Note) -
     edges = edges_of(triangles)
     _check_edges(name, vertices, edges)
     # the corners of both triangles at each edge, next to each other
-    order = np.argsort(edges.number, kind="stable").reshape(-1, 2)
+    order = edges.sides
     _check_pieces(name, vertices, triangles, order, edges)
     agree = edges.forward[order[:, 0]] != edges.forward[order[:, 1]]
     if not agree.all():
@@ -209,13 +220,8 @@ def _check_pieces(name: str, vertices: FloatArray, triangles: IntArray, order: I
             f"{name} holds {pieces} separate surfaces{hint}, of {', '.join(map(str, counts[:5]))} "
             f"{'... ' if pieces > 5 else ''}triangles; take one, e.g. part='largest', or all with union=True"
         )
-    # corners of one vertex that are joined through edges: the umbrellas
-    after = _next(left), _next(right)
-    same = edges.forward[left] == edges.forward[right]
-    starts = np.concatenate([left, after[0]])
-    ends = np.concatenate([np.where(same, right, after[1]), np.where(same, after[1], right)])
-    umbrellas, label = components(3 * len(triangles), starts, ends)
-    if umbrellas > len(vertices):
+    count, label = umbrellas(edges, left, right)
+    if count > len(vertices):
         _, corner = np.unique(label, return_index=True)
         shared = np.bincount(triangles.ravel()[corner], minlength=len(vertices)) > 1
         place = np.round(vertices[shared][0], 6).tolist()
@@ -225,11 +231,23 @@ def _check_pieces(name: str, vertices: FloatArray, triangles: IntArray, order: I
         )
 
 
-def _next(corner: IntArray) -> IntArray:
+def umbrellas(edges: Edges, left: IntArray, right: IntArray) -> tuple[int, IntArray]:
+    """How many groups there are of corners of one vertex joined through edges, and that of each corner (3 m,).
+
+    ``left`` and ``right`` (k,) are corners whose edges are joined: the ends of both are the same places.
+    """
+    after = next_corner(left), next_corner(right)
+    same = edges.forward[left] == edges.forward[right]
+    ends = np.concatenate([np.where(same, right, after[1]), np.where(same, after[1], right)])
+    return components(len(edges.number), np.concatenate([left, after[0]]), ends)
+
+
+def next_corner(corner: IntArray) -> IntArray:
+    """Corner (k,) of the flat triangles that follows in the same triangle."""
     return corner - corner % 3 + (corner + 1) % 3
 
 
-def _turned(name: str, count: int, pairs: IntArray, agree: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _turned(name: str, count: int, pairs: IntArray, agree: BoolArray) -> BoolArray:
     """Triangles to turn so that all agree with their neighbours."""
     left, right = pairs.T
     starts = np.concatenate([left, left + count])
@@ -238,6 +256,41 @@ def _turned(name: str, count: int, pairs: IntArray, agree: NDArray[np.bool_]) ->
     if np.any(label[:count] == label[count:]):
         raise ValueError(f"{name} has one side only, like a Moebius strip or Klein bottle; give a body")
     return np.asarray(label[:count] > label[count:])
+
+
+def cut(vertices: FloatArray, triangles: IntArray, edge: IntArray, at: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Vertices and triangles of a mesh (n, 3) and (m, 3) with more vertices (c, 3) on its edges with numbers (c,).
+
+    Triangles with such edges fall into two, three or four.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> points = np.array([[0.5, 0.5, 0], [0.5, 0, 0.5]])
+    >>> cut(np.eye(3), np.array([[0, 1, 2]]), np.array([0, 1]), points)[1].tolist()
+    [[0, 3, 4], [3, 1, 4], [1, 2, 4]]
+    """
+    edges = edges_of(triangles)
+    new = np.full(len(edges.ends), -1)
+    new[edge] = len(vertices) + np.arange(len(edge))
+    # on the edges that follow the corners
+    between = new[edges.number].reshape(-1, 3)
+    count = (between >= 0).sum(axis=1)
+    parts = [triangles[count == 0]]
+    for number in (1, 2, 3):
+        t, m = triangles[count == number].copy(), between[count == number].copy()
+        for _ in range(2):
+            # turned until the first edge is cut, of two cuts the last as well
+            wrong = (m[:, 0] < 0) | ((m[:, 2] < 0) & (number == 2))
+            t[wrong], m[wrong] = np.roll(t[wrong], -1, axis=1), np.roll(m[wrong], -1, axis=1)
+        (a, b, c), (ab, bc, ca) = t.T, m.T
+        split = {
+            1: [(a, ab, c), (ab, b, c)],
+            2: [(a, ab, ca), (ab, b, ca), (b, c, ca)],
+            3: [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)],
+        }[number]
+        parts += [np.stack(part, axis=1) for part in split]
+    return np.concatenate([vertices, at]), np.concatenate(parts)
 
 
 def components(count: int, starts: IntArray, ends: IntArray) -> tuple[int, IntArray]:

@@ -134,8 +134,8 @@ def test_what_is_refused_as_strict(text, match):
 
 
 BAD_BOUNDS = {
-    "NaN": ([[np.nan] * 3, [2] * 3], "no box"),
-    "shape": ([[-2, -2], [2, 2]], "no box"),
+    "NaN": ([[np.nan] * 3, [2] * 3], "no array of"),
+    "shape": ([[-2, -2], [2, 2]], "no array of"),
     "text": ("all", "not numbers"),
     "cuts the body": ([[-0.5, -2, -2], [2, 2, 2]], "cut there; give wider bounds"),
     "beside the body": ([[3] * 3, [5] * 3], "nowhere negative at .* points of the bounds: no body"),

@@ -161,7 +161,7 @@ class Fits:
     def attempt(self, number: int, rng: Generator, place: Path) -> Verdict:
         """Change the fit and make the body of it."""
         import scatterers as sc
-        from scatterers.spline.cache import DIGEST, load
+        from scatterers.fits.cache import DIGEST, load
 
         signed = rng.random() < 0.5
         if signed:
@@ -183,7 +183,7 @@ class Fits:
         return Verdict(ACCEPTED, "as fitted" if np.array_equal(values, self.values) else "another, signed anew")
 
     def _changed(self, rng: Generator) -> bytes:
-        from scatterers.spline.cache import DIGEST
+        from scatterers.fits.cache import DIGEST
 
         if rng.random() < 0.3:
             return mutated(self.whole[DIGEST:], rng)

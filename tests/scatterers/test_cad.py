@@ -14,9 +14,10 @@ from cad_files import made
 import creeping as cr
 import scatterers as sc
 from creeping.geometry.surface import normal, project
-from scatterers.cad_file import files as _cad_files
-from scatterers.cad_file.files import CadReading, read_cad
+from scatterers.triangles import cad_file as _cad_files
+from scatterers.triangles.cad_file import CadReading, read_cad
 from scatterers.triangles.quality import Choice
+from scatterers.triangles.topology import edges_of
 
 pytest.importorskip("gmsh", exc_type=ImportError)
 
@@ -89,7 +90,7 @@ def test_points_lie_on_the_body_with_its_normals(files, name):
     found, body = points_of(files / name), EXACT[name.split(".")[0]]
     at = found.mesh.vertices
     assert 1500 < len(at) < 3000
-    assert found.edges == () and len(found.non_smooth) == 0 and found.mesh.repairs == ()
+    assert found.edges == () and not found.creases.any() and found.mesh.repairs == ()
     assert np.max(np.abs(body.level(at)) / np.linalg.norm(body.gradient(at), axis=1)) < 1e-12
     # at a pole of its parameters a face has none
     known = np.isfinite(found.normals).all(axis=1)
@@ -223,13 +224,18 @@ def test_solids_that_share_a_wall_have_an_outer_surface(files, name, options, pi
     assert np.array_equal(body.level(points) < 0, inside)
 
 
+def on_creases(found):
+    return found.mesh.vertices[edges_of(found.mesh.triangles).ends[found.creases]].reshape(-1, 3)
+
+
 def test_edges_are_where_they_are(files):
     found = points_of(files / "box.brep")
     assert len(found.edges) == 12 and all("90 deg" in line for line in found.edges)
-    off = np.sort(np.minimum(found.non_smooth, 1 - found.non_smooth), axis=1)
+    sharp = on_creases(found)
+    off = np.sort(np.minimum(sharp, 1 - sharp), axis=1)
     np.testing.assert_allclose(off[:, :2], 0, atol=1e-12)
     rim = points_of(files / "cone.brep")
-    np.testing.assert_allclose(rim.non_smooth[:, 2], 0, atol=1e-12)
+    np.testing.assert_allclose(on_creases(rim)[:, 2], 0, atol=1e-12)
     assert points_of(files / "capsule.brep").edges == ()
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from scatterers.cad_file import files as _cad_files
+from scatterers.triangles import cad_file as _cad_files
 
 
 @pytest.mark.parametrize(

@@ -12,10 +12,9 @@ from tolerances import TRACE
 
 import creeping as cr
 from creeping.geodesics.bundle import random_bundle_points
+from scatterers.charts.samples import body_cloud
 from scatterers.implicit import Implicit
-from scatterers.spline.cloud import body_cloud
 
-COLUMNS = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
 LENGTH = 1e-7
 """Length of a shadow line against the ten digits of a second method, on another representation of the same body."""
 
@@ -82,15 +81,8 @@ def test_level_and_derivatives_are_those_of_the_text(name, rng):
     value, gradient, hessian = body.level(points), body.gradient(points), body.hessian(points)
     np.testing.assert_allclose(value, expected, atol=1e-13 * np.max(np.abs(gradient)))
     scale = np.max(np.abs(hessian))
-    # the compiled ones against those of numpy
-    plain = [
-        np.stack([np.broadcast_to(part, len(points)) for part in f(*points.T)], axis=-1)
-        for f in (functions.value, functions.gradient, functions.hessian)
-    ]
-    np.testing.assert_allclose(value, plain[0][:, 0], atol=1e-13 * scale)
-    np.testing.assert_allclose(gradient, plain[1], atol=1e-13 * scale)
-    np.testing.assert_allclose(np.stack([hessian[:, i, j] for i, j in COLUMNS], axis=-1), plain[2], atol=1e-12 * scale)
-    # and both against differences
+    # the compiled value against that of numpy, its derivatives against differences
+    np.testing.assert_allclose(value, np.broadcast_to(functions.value(*points.T)[0], len(points)), atol=1e-13 * scale)
     assert_derivatives(body, points[::7], 1e-5, 1e-8 * scale, 1e-7 * scale)
 
 
@@ -207,7 +199,7 @@ def test_rays_are_those_of_the_exact_body(name, rng):
 
 def test_charts_that_cannot_be_are_sought_once(monkeypatch):
     """To find that out takes as long as charts do."""
-    from scatterers.atlas.monge.atlas import MongeAtlas
+    from scatterers.charts.monge import MongeAtlas
 
     asked = []
 

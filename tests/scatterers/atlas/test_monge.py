@@ -12,8 +12,8 @@ import scatterers as sc
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geometry.evaluators import polar_frame
 from creeping.geometry.surface import project
-from scatterers.atlas.monge.atlas import MongeAtlas
-from scatterers.spline.cloud import body_cloud, onto, sign_changes
+from scatterers.charts.monge import MongeAtlas
+from scatterers.charts.samples import body_cloud, onto, sign_changes
 
 
 def ring(x):

@@ -160,7 +160,7 @@ def test_derivatives_are_those_of_differences_and_compiled_functions_their_sourc
         bend = 2e-5 * scale / size if name in NAMED else 1e-6
         assert_derivatives(piece, points, step * size, 1e-8 * scale, bend)
     points = rng.uniform(*body.bounds, (200, 3))
-    for compiled in (body.compiled, body._compiled_numbers, *(piece.compiled for piece in body.pieces)):
+    for compiled in (body.compiled, *(piece.compiled for piece in body.pieces)):
         assert_compiled_is_its_source(compiled, points, 1e-12 if name in NAMED else 1e-9)
 
 

@@ -10,7 +10,7 @@ from body_checks import rms, shape_operator, unit
 
 import scatterers as sc
 from creeping.geometry.surface import project
-from scatterers.pieces.spline_body import SplinePieces
+from scatterers.fits.spline_pieces import SplinePieces, packed, unpacked
 
 R, TUBE = 1.0, 0.4
 
@@ -162,19 +162,23 @@ DAMAGE = {
     "normals": lambda a: a["normals"][1:],
     "creases": lambda a: a["creases"] + [0, 5, 0, 0, 0],
     "crease-points": lambda a: a["crease-points"][:-3],
-    "coefficients-0": lambda a: a["coefficients-0"][:5],
+    "fine-coefficients-0": lambda a: a["fine-coefficients-0"][:5],
 }
 
 
 @pytest.mark.parametrize("name", DAMAGE)
 def test_damaged_pieces_are_refused(name):
-    arrays = opened("L")._parts.arrays("fine")
-    plain = {key.removeprefix("fine-"): value for key, value in arrays.items()}
-    SplinePieces.restored(arrays, "fine")
+    parts = opened("L")._parts
+    arrays = parts.arrays() | packed(parts.space.splines, "fine")
+
+    def restored(changed):
+        return SplinePieces.restored(arrays | changed, unpacked(arrays | changed, "fine"))
+
+    restored({})
     with pytest.raises(ValueError, match="damaged"):
-        SplinePieces.restored(arrays | {f"fine-{name}": DAMAGE[name](plain)}, "fine")
+        restored({name: DAMAGE[name](arrays)})
     for place, value in [(3, np.nan), (3, -1.0), (4, 0.0), (4, 1e9), (7, 3.0), (9, 1e12), (9, 0.0)]:
-        table = arrays["fine-table"].copy()
+        table = arrays["table"].copy()
         table[place] = value
         with pytest.raises(ValueError, match="the table of the pieces is damaged"):
-            SplinePieces.restored(arrays | {"fine-table": table}, "fine")
+            restored({"table": table})

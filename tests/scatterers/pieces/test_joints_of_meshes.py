@@ -13,10 +13,10 @@ import creeping as cr
 import scatterers as sc
 from creeping.geodesics.states import pack
 from creeping.geometry.surface import normal, size
-from scatterers.pieces.joints import Cuts, cut, jointed
+from scatterers.fits.joints import jointed
 from scatterers.triangles.jets import osculating_jets
 from scatterers.triangles.quality import assess, jumps_at, noise_at_most
-from scatterers.triangles.topology import edges_of
+from scatterers.triangles.topology import cut, edges_of
 from tests.exact_meshes import capsule, geodesic_sphere, slivers, torus_grid
 
 PILL, CONE = sc.Capsule(0.8, 3.1), sc.ConeSphere(1.0, 3.3)
@@ -129,7 +129,7 @@ def test_smooth_bodies_have_no_joints(name, noise, count):
     rng = np.random.default_rng(11)
     points = points + noise * 0.5 * np.linalg.norm(np.ptp(points, axis=0)) * rng.normal(size=points.shape)
     jets = osculating_jets(points, triangles)
-    quality = assess(SimpleNamespace(vertices=points, triangles=triangles), jets)
+    quality = assess(points, triangles, jets)
     clean = jets.fitted & ~quality.bad & ~jumps_at(jets, quality.edge_mean)
     assert jointed(points, triangles, jets.normals, clean) is None
     # nor within all that jets leave, taken for noise
@@ -144,7 +144,6 @@ def test_a_cut_mesh_is_the_same_surface():
     edges = edges_of(triangles)
     some = np.flatnonzero(np.random.default_rng(0).random(len(edges.ends)) < 0.4)
     middles = points[edges.ends[some]].mean(axis=1)
-    cuts = Cuts(some, middles, np.zeros((len(some), 1), dtype=bool))
-    x, t, _ = cut(points, triangles, np.zeros((len(points), 1), dtype=bool), cuts)
+    x, t = cut(points, triangles, some, middles)
     assert len(x) == len(points) + len(some) and np.all(edges_of(t).faces == 2)
     assert volume(x, t) == pytest.approx(volume(points, triangles), rel=1e-13)

@@ -5,8 +5,8 @@ import pytest
 import trimesh
 
 import scatterers as sc
-from scatterers.pieces.patch import curved, divided, polynomial_through
-from scatterers.spline.tensor import SYMMETRIC, evaluated
+from scatterers.fits.patch import curved, divided, polynomial_through
+from scatterers.kernels.compiled import SYMMETRIC, evaluated
 
 RNG = np.random.default_rng(11)
 U, V = RNG.uniform(0, 1.5, 200), RNG.uniform(-1, 1, 200)
@@ -78,7 +78,7 @@ def test_divided_triangles_cover_the_area(edge):
 
 
 def test_too_many_triangles_are_refused(monkeypatch):
-    monkeypatch.setattr("scatterers.pieces.patch.MOST", 1000)
+    monkeypatch.setattr("scatterers.fits.patch.MOST", 1000)
     with pytest.raises(ValueError, match=r"sides of at most 1e-06 L ask for more than \d+ triangles"):
         divided(np.eye(3)[None], 1e-6)
 

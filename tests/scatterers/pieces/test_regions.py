@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from scatterers.pieces.regions import regions_of
+from scatterers.triangles.regions import regions_of
 from tests.exact_meshes import geodesic_sphere, torus_grid
 
 
@@ -54,21 +54,21 @@ def test_regions_are_the_faces_and_creases_their_edges(name):
 def test_a_concave_edge_turns_the_other_way():
     box = trimesh.creation.box()
     found = regions_of(np.asarray(box.vertices), np.asarray(box.faces))
-    assert np.all(found.turns.turn[found.crease] == pytest.approx(90))
+    assert np.all(found.turn[found.crease] == pytest.approx(90))
     hollow = regions_of(np.asarray(box.vertices), np.asarray(box.faces)[:, ::-1])
-    assert np.all(hollow.turns.turn[hollow.crease] == pytest.approx(-90))
+    assert np.all(hollow.turn[hollow.crease] == pytest.approx(-90))
 
 
 def test_known_creases_are_taken_and_short_chains_left_out():
     points, triangles = geodesic_sphere(600)
     whole = regions_of(points, triangles)
-    edges = whole.turns.ends
+    edges = whole.ends
     equator = np.zeros(len(edges), dtype=bool)
     equator[:3] = True
     # three edges, hardly turned, are no crease
     assert regions_of(points, triangles, sharp=equator).count == 1
     upper = points[triangles].mean(axis=1)[:, 2] > 0
-    between = upper[whole.turns.sides[:, 0]] != upper[whole.turns.sides[:, 1]]
+    between = upper[whole.sides[:, 0]] != upper[whole.sides[:, 1]]
     for known in ({"sharp": between}, {"sharp": np.zeros_like(between), "level": between}):
         halves = regions_of(points, triangles, **known)
         assert halves.count == 2 and np.array_equal(halves.number == halves.number[np.argmax(upper)], upper)

@@ -179,7 +179,6 @@ def test_what_a_subdivision_makes_is_bounded():
         ({"part": 1.5}, "part = 1.5; give"),
         ({"cap": 0}, "cap = 0 is no size in m"),
         ({"cap": np.nan}, "cap = nan is no size"),
-        ({"union": 1}, "union = 1 is neither True nor False"),
         ({"subdivide": 0}, "subdivide = 0; give 1, 2 or 3"),
         ({"subdivide": "often"}, "subdivide = 'often'; give"),
     ],

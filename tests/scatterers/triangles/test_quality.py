@@ -7,7 +7,6 @@ import pytest
 import trimesh
 
 import scatterers as sc
-from scatterers.triangles.files import TriangleMesh
 from scatterers.triangles.jets import osculating_jets
 from scatterers.triangles.quality import MeshQuality, assess
 from tests.exact_meshes import almond, capsule, geodesic_sphere, noisy, slivers, torus_grid
@@ -17,7 +16,8 @@ make = trimesh.creation
 
 def judged(vertices, triangles):
     vertices = np.array(vertices, dtype=float)
-    return assess(TriangleMesh(vertices, triangles), osculating_jets(vertices, np.array(triangles)))
+    triangles = np.array(triangles)
+    return assess(vertices, triangles, osculating_jets(vertices, triangles))
 
 
 def even(body, n):

@@ -1,1 +1,0 @@
-"""Atlas of graphs over tangent planes, for bodies of any genus."""

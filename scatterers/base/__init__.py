@@ -1,1 +1,0 @@
-"""What bodies share: their base classes."""

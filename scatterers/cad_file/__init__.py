@@ -1,1 +1,0 @@
-"""CAD files through gmsh, in a process of its own."""

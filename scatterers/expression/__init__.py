@@ -1,1 +1,0 @@
-"""Bodies given by an expression: parsing, search of the body, singular points."""

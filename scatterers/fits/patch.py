@@ -1,0 +1,301 @@
+"""F of one smooth region of a body: a plane or quadric where its points lie on one, else a fitted spline.
+
+A quadric Q = 0 has q of unit length that makes sum ON^2 Q(x)^2 + |n x grad Q(x)|^2 least over points x and normals n,
+which tell it from other quadrics through the points. It is taken if all points lie on it within `EXACT` of the body's
+size, as those of cylinders, cones and balls of engineering do, or if what is left, e over a length l, changes
+curvatures by 8 e/l^2 < `CLOSE` of the largest, as of cylinders that a program wrote as splines. As polynomials of
+degree 2 both kinds are splines of one cell, which go on as they are far beyond the region. Other regions are fitted as
+whole bodies are (`scatterers.fits.solver`), from their own points only, so that nothing is rounded off at their
+borders; a coarser fit tells how far they are known.
+
+Also here: curved triangles: points between the corners of a mesh that has normals there, and a mesh made of them.
+
+With corners x_i, normals n_i and barycentric coordinates b_i, the cubic triangle of [VPBM01],
+
+    x = sum b_ijk(x, n) 3!/(i! j! k!) b_1^i b_2^j b_3^k,   b_210 = (2 x_1 + x_2 - ((x_2 - x_1).n_1) n_1)/3, ...,
+
+and quadratic normals, which mirror the mean of two normals in the middle of a side. Neighbours with common normals meet
+without gaps.
+
+Sources: Derivations, B13; [VPBM01] Vlachos, Peters, Boyd, Mitchell, Curved PN triangles, I3D 2001, eqs. 1 to 6.
+"""
+
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from creeping._typing import FloatArray, IntArray
+from scatterers.fits.solver import ACCURACY, COARSER, fit, spacing_of
+from scatterers.fits.tensor import TensorSpline
+from scatterers.kernels.tensor import POWERS
+from scatterers.triangles.jets import Jets, centroids, signed_distance
+
+EXACT = 1e-6
+"""Distance of points from a plane or quadric, in body sizes, within which they lie on it: single precision and some."""
+OUTLIER, EVENLY = 5.0, 1.4
+"""Largest and rms distance of noisy points from their quadric, in their noise: the rms tells what a quadric misses."""
+CLOSE = 2e-4
+LEAN = 0.35
+"""Angle between the normals of triangles and a quadric through their corners, radians."""
+SLIGHT, FEW = 0.1, 0.3
+"""Of the median slope of a quadric: with less, as next to the tip of a cone, it turns much within a triangle, and
+normals need only be on the same side; and the largest share of such points."""
+TIP = 1e-3
+"""Of the median slope: with less there is no normal to compare. Also the share of a piece's size by which the sheets of
+a cone may miss their tip."""
+ON = 1e4
+"""Weight of points against normals, which those of triangles give roughly."""
+SPACING, BETWEEN, NODES = 1.8, 1.1, 4e5
+"""Grid of a spline in units of the distance of points, of those with others between them, and its most nodes."""
+STEPS = 300
+"""Of a fit: the borders of a piece take long, and gain little."""
+CLOSELY, ROUGHLY = ACCURACY, 3e-4
+"""Change of the curvatures at which fits stop: from jets, and from points of curved triangles, which err by more."""
+MOST = 4_000_000
+"""Triangles of a mesh that is made."""
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """F of one region.
+
+    Attributes
+    ----------
+    fine, coarse : TensorSpline
+        The second known less well; the same for planes and quadrics.
+    kind : {"plane", "quadric", "spline"}
+    misfit, turn : float
+        Rms distance of the points from F = 0, L, and rms angle between grad F and the normals there, radians.
+    spacing : float
+        Of the points, L; 0 for planes and quadrics.
+    """
+
+    fine: TensorSpline
+    coarse: TensorSpline
+    kind: str
+    misfit: float
+    turn: float
+    spacing: float
+
+
+def spline_patch(
+    points: FloatArray, normals: FloatArray, spacing: float, jets: Jets | None = None, triangles: IntArray | None = None
+) -> Patch:
+    """F of a region fitted to points (n, 3), L, so far apart, and outward normals (n, 3).
+
+    With jets at the points and triangles (m, 3) between them, to the points that jets give there as well.
+    """
+    distance = mean = None
+    accuracy, cells = ROUGHLY, SPACING
+    if jets is not None and triangles is not None:
+        more, there = centroids(points, triangles, jets)
+        distance = partial(signed_distance, points, jets)
+        accuracy, cells = CLOSELY, BETWEEN
+        mean = np.concatenate([np.where(jets.fitted, jets.mean, np.nan), np.full(len(more), np.nan)])
+        points, normals = np.concatenate([points, more]), np.concatenate([normals, there])
+    grid = max(cells * spacing, spacing_of(points, NODES))
+    fine, coarse = (
+        fit(
+            points,
+            normals,
+            h,
+            distance=distance,
+            mean_curvature=mean,
+            keep_start=distance is not None,
+            accuracy=accuracy,
+            iterations=STEPS,
+        )
+        for h in (grid, COARSER * grid)
+    )
+    return Patch(fine.spline, coarse.spline, "spline", fine.misfit, fine.turn, spacing)
+
+
+class Closeness(NamedTuple):
+    """What points on a plane or quadric may be off it, all and rms, L."""
+
+    most: float
+    rms: float = np.inf
+
+    @classmethod
+    def of(cls, size: float, noise: float = 0.0) -> "Closeness":
+        """On a body of a size whose points have noise, both L."""
+        exact = cls(EXACT * size)
+        return cls(max(exact.most, OUTLIER * noise), max(exact.most, EVENLY * noise)) if noise else exact
+
+
+def polynomial_patch(points: FloatArray, normals: FloatArray, close: Closeness) -> Patch | None:
+    """Plane or quadric through points (n, 3), L, if there is one."""
+    found = polynomial_through(points, normals, close.most)
+    if found is not None and found[2] > close.rms:
+        return None
+    return None if found is None else Patch(found[0], found[0], *found[1:], 0.0, 0.0)
+
+
+def polynomial_through(
+    points: FloatArray, normals: FloatArray, tolerance: float
+) -> tuple[TensorSpline, str, float] | None:
+    """Plane or quadric through points within a tolerance, L, as a spline; its kind and rms distance.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> turn = np.linspace(0, 6, 50)
+    >>> normals = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    >>> _, kind, _ = polynomial_through(normals + np.outer(turn % 1, [0, 0, 1]), normals, 1e-6)
+    >>> kind
+    'quadric'
+    """
+    middle = points.mean(axis=0)
+    half = float(np.max(np.ptp(points, axis=0))) or 1.0
+    x = (points - middle) / half
+    for kind, degree in (("plane", 1), ("quadric", 2)):
+        powers = [(a, b, c) for a in range(3) for b in range(3) for c in range(3) if a + b + c <= degree]
+        value, slope = _monomials(x, powers)
+        if len(x) * 3 < len(powers):
+            continue
+        q = _least(value, slope, normals)
+        # the normals of triangles tell which quadric it is; its own do not pull at it
+        q = _least(value, slope, np.einsum("npk,p->nk", slope, q))
+        f, g = value @ q, np.einsum("npk,p->nk", slope, q)
+        steep = np.linalg.norm(g, axis=1)
+        lean = np.sum(g * normals, axis=1) / np.maximum(steep, 1e-300)
+        if np.median(lean) < 0:
+            f, g, lean, q = -f, -g, -lean, -q
+        bend = _bend(q, powers)
+        # the nearest point with Q = 0, of second order: next to the tip of a cone there is no slope to divide by
+        off = 2 * np.abs(f) / (steep + np.sqrt(steep**2 + 2 * bend * np.abs(f)) + 1e-300) * half
+        # a quadric may be a pair of sheets, of which the points take one
+        curved = CLOSE * bend / float(np.median(steep)) * half / 8 if kind == "quadric" else 0.0
+        slope = steep / np.median(steep)
+        least = np.select([slope > SLIGHT, slope > TIP], [np.cos(LEAN), 0.0], -1.0)
+        few = np.mean(slope <= SLIGHT) < FEW and np.sum(slope <= TIP) <= 1
+        if np.all(off <= max(tolerance, curved)) and np.all(lean >= least) and few:
+            return _as_spline(q / np.median(steep), powers, middle, half), kind, float(np.sqrt(np.mean(off**2)))
+    return None
+
+
+def _least(value: FloatArray, slope: FloatArray, normals: FloatArray) -> FloatArray:
+    """q (p,) of unit length with least sum ON^2 (value.q)^2 + |n x slope.q|^2, normals (n, 3) made unit vectors."""
+    n = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    across = np.cross(slope, n[:, None])
+    rows = np.concatenate([ON * value, *np.moveaxis(across, -1, 0)])
+    return np.asarray(np.linalg.svd(rows, full_matrices=False)[2][-1])
+
+
+def tip_of(patch: Patch) -> FloatArray | None:
+    """The point (3,), L, at which a quadric has no slope, if it lies on it: the tip of a cone."""
+    if patch.kind != "quadric":
+        return None
+    spline = patch.fine
+    middle = spline.origin + 0.5 * spline.spacing
+    hessian = spline.hessian(middle[None])[0]
+    strength = np.abs(np.linalg.eigvalsh(hessian))
+    if strength.min() < TIP * strength.max():
+        return None
+    tip = np.asarray(middle - np.linalg.solve(hessian, spline.gradient(middle[None])[0]))
+    # Q = 0 is a cone or nearly one: its sheets come as near as that to the tip
+    gap = np.sqrt(2 * abs(float(spline.level(tip[None])[0])) / strength.max())
+    return tip if gap < TIP * float(spline.spacing[0]) else None
+
+
+def _bend(q: FloatArray, powers: list[tuple[int, int, int]]) -> float:
+    """Size of the second derivatives of Q, in the variables of the monomials."""
+    second = np.array([[2.0 if 2 in p else 1.0] for p in powers]) * (np.sum(powers, axis=1) == 2)[:, None]
+    return float(np.linalg.norm(q[:, None] * second))
+
+
+def _monomials(x: FloatArray, powers: list[tuple[int, int, int]]) -> tuple[FloatArray, FloatArray]:
+    """Monomials (n, p) and their gradients (n, p, 3)."""
+    exponent = np.array(powers)
+    value = np.prod(x[:, None] ** exponent, axis=-1)
+    slope = np.empty((*value.shape, 3))
+    for axis in range(3):
+        lower = exponent.copy()
+        lower[:, axis] = np.maximum(lower[:, axis] - 1, 0)
+        slope[..., axis] = exponent[:, axis] * np.prod(x[:, None] ** lower, axis=-1)
+    return value, slope
+
+
+def _as_spline(q: FloatArray, powers: list[tuple[int, int, int]], middle: FloatArray, half: float) -> TensorSpline:
+    """half sum q_p ((x - middle)/half)^p as a spline of one cell, which reaches from middle - half to middle + half."""
+    # t of the cell is (1 + y)/2, y the variable of the monomials: coefficients of y^m
+    t = np.linspace(0.0, 1.0, 6)
+    rows = np.linalg.solve(
+        np.vander(t, 6, increasing=True) @ POWERS, np.stack([(2 * t - 1) ** m for m in range(3)], axis=1)
+    )
+    total = np.zeros((6, 6, 6))
+    for value, (a, b, c) in zip(q, powers, strict=True):
+        total += value * np.einsum("i,j,k->ijk", rows[:, a], rows[:, b], rows[:, c])
+    return TensorSpline(total * half, middle - half, np.full(3, 2 * half))
+
+
+def divided(corners: FloatArray, edge: float) -> tuple[IntArray, FloatArray]:
+    """Triangles (m, 3, 3) cut into others whose sides are at most ``edge`` long: of which one, and where.
+
+    Returns
+    -------
+    origin : (k,)
+        Number of the triangle that each of the k ones is part of.
+    barycentric : (k, 3, 3)
+        Of its corners, in that triangle.
+
+    Raises
+    ------
+    ValueError
+        If they are more than `MOST`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> origin, place = divided(np.array([[[0.0, 0, 0], [4, 0, 0], [0, 1, 0]]]), 1.5)
+    >>> len(origin), bool(np.allclose(place.sum(axis=-1), 1))
+    (9, True)
+    """
+    origin = np.arange(len(corners))
+    place = np.broadcast_to(np.eye(3), (len(corners), 3, 3)).copy()
+    done: list[tuple[IntArray, FloatArray]] = []
+    while len(origin):
+        x = place @ corners[origin]
+        side = np.linalg.norm(np.roll(x, -1, axis=1) - x, axis=2)
+        longest = np.argmax(side, axis=1)
+        fine = side[np.arange(len(x)), longest] <= edge
+        done.append((origin[fine], place[fine]))
+        origin, place, longest = origin[~fine], place[~fine], longest[~fine]
+        if sum(len(part) for part, _ in done) + 2 * len(origin) > MOST:
+            raise ValueError(f"sides of at most {edge:.3g} L ask for more than {MOST} triangles; take longer ones")
+        # halved at the longest side: the same point on both sides of it
+        rows = np.arange(len(origin))
+        a, b, c = (place[rows, (longest + k) % 3] for k in range(3))
+        middle = 0.5 * (a + b)
+        origin = np.concatenate([origin, origin])
+        place = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+    return np.concatenate([part for part, _ in done]), np.concatenate([part for _, part in done])
+
+
+def curved(corners: FloatArray, normals: FloatArray, place: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Points (..., 3), L, and unit normals of triangles (..., 3, 3) with such at their corners, at places (..., 3)."""
+    b = place[..., None]
+    x, n = np.moveaxis(corners, -2, 0), np.moveaxis(normals, -2, 0)
+    w = np.moveaxis(b, -2, 0)
+    points = sum(w[i] ** 3 * x[i] for i in range(3))
+    normal = sum(w[i] ** 2 * n[i] for i in range(3))
+    sides = np.zeros_like(x[0])
+    for i in range(3):
+        for j in range(3):
+            if i != j:
+                toward = (2 * x[i] + x[j] - np.sum((x[j] - x[i]) * n[i], axis=-1, keepdims=True) * n[i]) / 3
+                points = points + 3 * w[i] ** 2 * w[j] * toward
+                sides = sides + toward / 6
+    # the middle of the sides' points, and half as far again from the plane
+    points = points + 6 * w[0] * w[1] * w[2] * (1.5 * sides - 0.5 * (x[0] + x[1] + x[2]) / 3)
+    for i in range(3):
+        j = (i + 1) % 3
+        along = x[j] - x[i]
+        both = n[i] + n[j]
+        length = np.maximum(np.sum(along**2, axis=-1, keepdims=True), 1e-300)
+        middle = both - 2 * np.sum(along * both, axis=-1, keepdims=True) / length * along
+        middle = middle / np.maximum(np.linalg.norm(middle, axis=-1, keepdims=True), 1e-300)
+        normal = normal + 2 * w[i] * w[j] * middle
+    return np.asarray(points), np.asarray(normal / np.linalg.norm(normal, axis=-1, keepdims=True))

@@ -1,0 +1,336 @@
+"""Compiled parts of sphere maps and locators, and the map of `scatterers.charts.radial`; importing this imports numba.
+
+cos(pi z), sin(pi z) and the angle of a vector by polynomials: compilers vectorise them, and only call a library's.
+
+z = k + r with k the nearest integer, |r| <= 1/2 exactly; cos(pi z) = (-1)^k sum_j (-1)^j (pi r)^(2j)/(2j)!, the sine
+likewise. The Taylor sums end where (pi/2)^m/m! < 2e-17, so rounding, some 2e-16, is all that is left.
+
+The angle is 1/2 pi times arctan z = z - z^3/3 + ..., |z| <= tan(pi/8), by a polynomial with an error below rounding:
+arctan(a/b) = pi/4 + arctan((a - b)/(a + b)) for larger ones.
+
+The series are those of [AS64, sec. 4.3].
+
+Also here: parts of compiled locators: chart variables and tangents of the cube sphere, and the polar frame.
+
+With t = tan xi, t' = tan eta of the face (see `scatterers.charts.star`) and a common factor left out, which no
+frame sees,
+
+    s_u = (-p, du - t p, -t' p) in (a, b, c) up to signs,  p = t du/(1 + t^2 + t'^2),  du = 1 + t^2,
+
+and s_v likewise. The frame of tangents T is T (T^T T)^(-1/2), by the closed root of a 2 x 2 matrix.
+
+Also here: the radial map, whose parameters are those of the spline, `scatterers.kernels.tensor` says where.
+
+Sources: Derivations, B1, B2 and B4.
+"""
+
+import math
+from collections.abc import Callable
+from types import FunctionType
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from creeping._typing import FloatArray
+from scatterers.kernels.compiled import OPTIONS, helper
+from scatterers.kernels.tensor import (
+    AXIS,
+    BOX,
+    CENTRE,
+    DEGREE,
+    HALF_AXES,
+    ITERATIONS,
+    MIDDLE,
+    PER_HALF,
+    REACH,
+    SHIFTS,
+    SMALL,
+    value_and_gradient,
+)
+
+_COS: tuple[float, ...] = tuple((-1) ** j * math.pi ** (2 * j) / math.factorial(2 * j) for j in range(12))
+_SIN: tuple[float, ...] = tuple((-1) ** j * math.pi ** (2 * j + 1) / math.factorial(2 * j + 1) for j in range(11))
+
+_TAN_PI_8 = math.tan(math.pi / 8)
+_ATAN: tuple[float, ...] = (
+    -0.33333333333328435,
+    0.19999999998854168,
+    -0.14285714180900647,
+    0.11111106177375227,
+    -0.09090773003240828,
+    0.07689952488233016,
+    -0.066402251735395,
+    0.0568830340363325,
+    -0.04347919839046537,
+    0.021133752033748364,
+)
+
+
+@helper
+def cos_pi(z: float) -> float:
+    """cos(pi z) of a number."""
+    nearest = math.floor(z + 0.5)
+    r = z - nearest
+    r2 = r * r
+    total = _COS[11]
+    for j in range(10, -1, -1):
+        total = total * r2 + _COS[j]
+    return total * (1.0 - 2.0 * (nearest - 2.0 * math.floor(0.5 * nearest)))
+
+
+@helper
+def sin_pi(z: float) -> float:
+    """sin(pi z) of a number."""
+    nearest = math.floor(z + 0.5)
+    r = z - nearest
+    r2 = r * r
+    total = _SIN[10]
+    for j in range(9, -1, -1):
+        total = total * r2 + _SIN[j]
+    return total * r * (1.0 - 2.0 * (nearest - 2.0 * math.floor(0.5 * nearest)))
+
+
+@helper
+def turns(across: float, along: float) -> float:
+    """atan2(across, along) in turns, in [-1/2, 1/2]; 0 of a vector that vanishes."""
+    a, b = abs(across), abs(along)
+    low, high = min(a, b), max(a, b)
+    steep = low > _TAN_PI_8 * high
+    top = low - high if steep else low
+    bottom = low + high if steep else high
+    z = top / (bottom if bottom > 0.0 else 1.0)
+    s = z * z
+    total = _ATAN[9]
+    for j in range(8, -1, -1):
+        total = total * s + _ATAN[j]
+    angle = (z + z * s * total) * (0.5 / math.pi)
+    angle = angle + 0.125 if steep else angle
+    angle = 0.25 - angle if a > b else angle
+    angle = 0.5 - angle if along < 0.0 else angle
+    return -angle if across < 0.0 else angle
+
+
+@helper
+def cube_tangents(
+    sx: float, sy: float, sz: float
+) -> tuple[int, float, float, float, float, float, float, float, float]:
+    """Chart number, u, v and the directions s_u and s_v at a point of the sphere, whose length is free."""
+    s = (sx, sy, sz)
+    size = (abs(sx), abs(sy), abs(sz))
+    a = 0 if size[0] >= size[1] and size[0] >= size[2] else (1 if size[1] >= size[2] else 2)
+    b, c = (a + 1) % 3, (a + 2) % 3
+    sign = -1.0 if s[a] < 0 else 1.0
+    tan_u, tan_v = s[b] / s[a], s[c] / size[a]
+    number = 2 * a + (1 if s[a] < 0 else 0)
+    u = math.atan(tan_u) / (math.pi / 2) + 0.5
+    v = math.atan(tan_v) / (math.pi / 2) + 0.5
+    # tangents of the cube, (0, sign du, 0) and (0, 0, dv), less their part along s
+    norm2 = 1.0 + tan_u * tan_u + tan_v * tan_v
+    du, dv = 1.0 + tan_u * tan_u, 1.0 + tan_v * tan_v
+    p = tan_u * du / norm2
+    q = tan_v * dv / norm2
+    ta, tb, tc = -sign * p, sign * (du - tan_u * p), -tan_v * p
+    wa, wb, wc = -sign * q, -sign * tan_u * q, dv - tan_v * q
+    if a == 0:
+        return number, u, v, ta, tb, tc, wa, wb, wc
+    if a == 1:
+        return number, u, v, tc, ta, tb, wc, wa, wb
+    return number, u, v, tb, tc, ta, wb, wc, wa
+
+
+@helper
+def fill_frame(frame: FloatArray, i: int, tx: float, ty: float, tz: float, wx: float, wy: float, wz: float) -> None:
+    """Write the polar frame of two tangents into column i of frame (6, n)."""
+    g11 = tx * tx + ty * ty + tz * tz
+    g12 = tx * wx + ty * wy + tz * wz
+    g22 = wx * wx + wy * wy + wz * wz
+    root = math.sqrt(g11 * g22 - g12 * g12)
+    scale = 1.0 / (root * math.sqrt(g11 + g22 + 2 * root))
+    m11, m12, m22 = (g22 + root) * scale, -g12 * scale, (g11 + root) * scale
+    frame[0, i] = tx * m11 + wx * m12
+    frame[1, i] = ty * m11 + wy * m12
+    frame[2, i] = tz * m11 + wz * m12
+    frame[3, i] = tx * m12 + wx * m22
+    frame[4, i] = ty * m12 + wy * m22
+    frame[5, i] = tz * m12 + wz * m22
+
+
+@njit(**OPTIONS)
+def _exit(y, parameters):  # type: ignore[no-untyped-def]
+    """Largest r for which c + r y is in the box of the sheared grid."""
+    largest = math.inf
+    for axis in range(3):
+        if y[axis] > 0.0:
+            largest = min(largest, parameters[BOX + 3 + axis] / y[axis])
+        elif y[axis] < 0.0:
+            largest = min(largest, parameters[BOX + axis] / y[axis])
+    return largest
+
+
+@njit(**OPTIONS)
+def _beyond(x, parameters):  # type: ignore[no-untyped-def]
+    """Whether a point is beyond the grid."""
+    for axis in range(3):
+        g = (x[axis] - parameters[3 + axis]) * parameters[6 + axis]
+        if g < 0.0 or g > parameters[axis] - 5.0:
+            return True
+    return False
+
+
+@njit(**OPTIONS)
+def _polynomial(t, start, parameters):  # type: ignore[no-untyped-def]
+    """Value and derivative of a polynomial whose coefficients begin at start."""
+    value, slope = parameters[start + DEGREE], 0.0
+    for m in range(DEGREE - 1, -1, -1):
+        slope = slope * t + value
+        value = value * t + parameters[start + m]
+    return value, slope
+
+
+@njit(**OPTIONS)
+def _spine(w, parameters):  # type: ignore[no-untyped-def]
+    """Shift T(w) - w and its derivative along the spine's axis, which an x in the place of w has too."""
+    per_half = parameters[PER_HALF]
+    if per_half == 0.0:
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    t = (w[int(parameters[AXIS])] - parameters[MIDDLE]) * per_half
+    if abs(t) > REACH:
+        t, per_half = math.copysign(REACH, t), 0.0
+    x, dx = _polynomial(t, SHIFTS, parameters)
+    y, dy = _polynomial(t, SHIFTS + DEGREE + 1, parameters)
+    z, dz = _polynomial(t, SHIFTS + 2 * DEGREE + 2, parameters)
+    return (x, y, z), (per_half * dx, per_half * dy, per_half * dz)
+
+
+@njit(**OPTIONS)
+def _pulled(g, slope, parameters):  # type: ignore[no-untyped-def]
+    """DT^T g."""
+    axis, along = int(parameters[AXIS]), slope[0] * g[0] + slope[1] * g[1] + slope[2] * g[2]
+    x = g[0] + along if axis == 0 else g[0]
+    y = g[1] + along if axis == 1 else g[1]
+    return x, y, g[2] + along if axis == 2 else g[2]
+
+
+@njit(**OPTIONS)
+def _pushed(v, slope, parameters):  # type: ignore[no-untyped-def]
+    """DT v."""
+    along = v[int(parameters[AXIS])]
+    return v[0] + slope[0] * along, v[1] + slope[1] * along, v[2] + slope[2] * along
+
+
+@njit(**OPTIONS)
+def _at(r, y, parameters):  # type: ignore[no-untyped-def]
+    """x = T(c + r y), the slope of the spine there, F and DT^T grad F."""
+    w = (parameters[CENTRE] + r * y[0], parameters[CENTRE + 1] + r * y[1], parameters[CENTRE + 2] + r * y[2])
+    shift, slope = _spine(w, parameters)
+    x = (w[0] + shift[0], w[1] + shift[1], w[2] + shift[2])
+    value, gx, gy, gz = value_and_gradient(x[0], x[1], x[2], parameters)
+    return x, slope, value, _pulled((gx, gy, gz), slope, parameters)
+
+
+@njit(**OPTIONS)
+def _radius(y, parameters):  # type: ignore[no-untyped-def]
+    """Root r of F(T(c + r y)), NaN if none is found."""
+    low, high = 0.0, _exit(y, parameters)
+    r = 1.0 if high > 1.0 else 0.5 * high
+    for _ in range(ITERATIONS):
+        x, _, value, g = _at(r, y, parameters)
+        if _beyond(x, parameters):
+            value = math.inf
+        if value > 0.0:
+            high = min(high, r)
+        else:
+            low = max(low, r)
+        step = -value / (g[0] * y[0] + g[1] * y[1] + g[2] * y[2])
+        if abs(step) <= SMALL * r:
+            return r + step
+        inside = r + step > low and r + step < high
+        r = r + step if inside else 0.5 * (low + high)
+    return math.nan
+
+
+def forward(s, points, derivatives, parameters):  # type: ignore[no-untyped-def]
+    """Points and derivatives of psi for a block."""
+    a, b, c = parameters[HALF_AXES], parameters[HALF_AXES + 1], parameters[HALF_AXES + 2]
+    for i in range(s.shape[1]):
+        y = (a * s[0, i], b * s[1, i], c * s[2, i])
+        r = _radius(y, parameters)
+        # the gradient anew: at the last iterate it is off by a Newton step
+        x, slope, _, g = _at(r, y, parameters)
+        scale = r / (g[0] * y[0] + g[1] * y[1] + g[2] * y[2])
+        gx, gy, gz = scale * a * g[0], scale * b * g[1], scale * c * g[2]
+        points[0, i], points[1, i], points[2, i] = x
+        column = _pushed((r * a - y[0] * gx, -y[1] * gx, -y[2] * gx), slope, parameters)
+        derivatives[0, i], derivatives[3, i], derivatives[6, i] = column
+        column = _pushed((-y[0] * gy, r * b - y[1] * gy, -y[2] * gy), slope, parameters)
+        derivatives[1, i], derivatives[4, i], derivatives[7, i] = column
+        column = _pushed((-y[0] * gz, -y[1] * gz, r * c - y[2] * gz), slope, parameters)
+        derivatives[2, i], derivatives[5, i], derivatives[8, i] = column
+
+
+def forward_over(value_and_gradient: Callable[..., Any], name: str) -> FunctionType:
+    """`forward` over another F than a spline, whose plain Python this is.
+
+    Its code belongs to a file that does not exist: numba must not take what it keeps for splines.
+    """
+    space: dict[str, Any] = dict(globals())
+    space["value_and_gradient"] = njit(**OPTIONS)(value_and_gradient)
+    for caller in ("_at", "_radius"):
+        space[caller] = njit(**OPTIONS)(FunctionType(space[caller].py_func.__code__, space, caller))
+    return FunctionType(forward.__code__.replace(co_filename=f"<{name}>"), space, "forward")
+
+
+def one_cell(box: FloatArray, of_map: FloatArray) -> FloatArray:
+    """Parameters of a grid of one cell, the box (2, 3), L, in which an F of another kind is known; and of its map."""
+    return np.concatenate([np.full(3, 6.0), box[0], 1 / (box[1] - box[0]), of_map])
+
+
+def inverse(points, s, parameters):  # type: ignore[no-untyped-def]
+    """psi^-1 of a block.
+
+    The shift is not taken from `_spine` so that the loops are vectorised; each touches few rows for the same reason.
+    """
+    a, b, c = 1 / parameters[HALF_AXES], 1 / parameters[HALF_AXES + 1], 1 / parameters[HALF_AXES + 2]
+    spine, middle, per_half = int(parameters[AXIS]), parameters[MIDDLE], parameters[PER_HALF]
+    n = points.shape[1]
+    for axis in range(3):
+        centre, start = parameters[CENTRE + axis], SHIFTS + axis * (DEGREE + 1)
+        if per_half == 0.0 or axis == spine:
+            for i in range(n):
+                s[axis, i] = points[axis, i] - centre
+            continue
+        c0, c1, c2, c3 = parameters[start], parameters[start + 1], parameters[start + 2], parameters[start + 3]
+        c4, c5, c6 = parameters[start + 4], parameters[start + 5], parameters[start + 6]
+        for i in range(n):
+            t = (points[spine, i] - middle) * per_half
+            t = -REACH if t < -REACH else t
+            t = REACH if t > REACH else t
+            shift = c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * (c5 + t * c6)))))
+            s[axis, i] = points[axis, i] - shift - centre
+    for i in range(n):
+        x, y, z = a * s[0, i], b * s[1, i], c * s[2, i]
+        scale = 1.0 / math.sqrt(x * x + y * y + z * z)
+        s[0, i], s[1, i], s[2, i] = scale * x, scale * y, scale * z
+
+
+def locate(points, gradients, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]
+    """Chart, chart variables and polar frame of points on the body.
+
+    The frame does not see the factor r of d psi/ds, nor the length of y, so w - c serves for y.
+    """
+    a, b, c = parameters[HALF_AXES], parameters[HALF_AXES + 1], parameters[HALF_AXES + 2]
+    for i in range(points.shape[1]):
+        x, y, z = points[0, i], points[1, i], points[2, i]
+        shift, slope = _spine((x, y, z), parameters)
+        gx, gy, gz = _pulled((gradients[0, i], gradients[1, i], gradients[2, i]), slope, parameters)
+        x -= shift[0] + parameters[CENTRE]
+        y -= shift[1] + parameters[CENTRE + 1]
+        z -= shift[2] + parameters[CENTRE + 2]
+        chart[i], uv[0, i], uv[1, i], tx, ty, tz, wx, wy, wz = cube_tangents(x / a, y / b, z / c)
+        tx, ty, tz, wx, wy, wz = a * tx, b * ty, c * tz, a * wx, b * wy, c * wz
+        scale = 1.0 / (gx * x + gy * y + gz * z)
+        t, w = scale * (gx * tx + gy * ty + gz * tz), scale * (gx * wx + gy * wy + gz * wz)
+        tx, ty, tz = _pushed((tx - t * x, ty - t * y, tz - t * z), slope, parameters)
+        wx, wy, wz = _pushed((wx - w * x, wy - w * y, wz - w * z), slope, parameters)
+        fill_frame(frame, i, tx, ty, tz, wx, wy, wz)

@@ -1,1 +1,0 @@
-"""Bodies of smooth pieces that meet in edges, joints and tips."""

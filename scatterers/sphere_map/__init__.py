@@ -1,1 +1,0 @@
-"""Maps from the unit sphere to star-shaped bodies."""
