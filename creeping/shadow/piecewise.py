@@ -15,6 +15,7 @@ from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import SingularIncidenceError
 from creeping.geometry.piecewise import SMOOTH, pieces_of, tiles_of
 from creeping.geometry.surface import size
+from creeping.shadow.arcs import shared_out
 from creeping.shadow.attachment import Arc, LaunchPoints, occluded
 from creeping.shadow.curve import ShadowCurve
 from creeping.shadow.edges import EdgePart, parts_on_edges, unit_normals
@@ -208,7 +209,7 @@ def _joined(body: Any, curves: list[ShadowCurve]) -> tuple[ShadowCurve, ...]:
 
 
 def launched_from(curves: tuple[ShadowCurve, ...], arcs: list[Arc], direction: FloatArray, n_rays: int) -> LaunchPoints:
-    """So many launch points on arcs, shared among them by length, one at least on each, evenly spaced: n is 1.
+    """So many launch points on arcs, as `shared_out` has them, evenly spaced: n is 1.
 
     Half a spacing from the ends of an arc, where kappa_n, the illumination or the piece ends.
     """
@@ -217,7 +218,7 @@ def launched_from(curves: tuple[ShadowCurve, ...], arcs: list[Arc], direction: F
     arc_index, spacing, closed, state = (np.full(n_rays, np.nan) for _ in range(4))
     long = np.array([arc.end - arc.start for arc in arcs])
     first = 0
-    for number, count in enumerate(_shared(long, n_rays)):
+    for number, count in enumerate(shared_out(long, n_rays)):
         arc, rows = arcs[number], slice(first, first + count)
         curve = curves[arc.curve]
         place = arc.start + long[number] * (np.arange(count) + (0.0 if arc.closed else 0.5)) / max(count, 1)
@@ -228,18 +229,3 @@ def launched_from(curves: tuple[ShadowCurve, ...], arcs: list[Arc], direction: F
         first += count
     columns: tuple[Any, ...] = (points, arclength, curve_index, arc_index, spacing, closed, state)
     return LaunchPoints(direction[None], *(column[None] for column in columns))
-
-
-def _shared(long: FloatArray, wanted: int) -> list[int]:
-    """Whole numbers in proportion to lengths, at least one each while there are any, ``wanted`` in all."""
-    if not len(long) or not wanted:
-        return [0] * len(long)
-    if wanted <= len(long):
-        return [1] * wanted + [0] * (len(long) - wanted)
-    exact = wanted * long / long.sum()
-    counts = np.maximum(exact.astype(np.int64), 1)
-    while counts.sum() < wanted:
-        counts[np.argmax(exact - counts)] += 1
-    while counts.sum() > wanted:
-        counts[np.argmax(np.where(counts > 1, counts - exact, -np.inf))] -= 1
-    return [int(count) for count in counts]
