@@ -81,7 +81,8 @@ class CoarseMesh(NamedTuple):
 def coarse_mesh(body: Any, share: float) -> CoarseMesh:
     """A coarse mesh of a body, of pieces with sides of a share of its size."""
     if not is_piecewise(body):
-        meshes = [quadrilaterals(body.level, body.gradient, body.bounds, cells=n, fewest=min(n, 24)) for n in CELLS]
+        given = body.level, body.gradient, body.bounds
+        meshes = [quadrilaterals(*given, cells=n, fewest=min(n, 24), mirrored=True) for n in CELLS]
         kinds = [len(vertices) - len(tiles) for vertices, tiles in meshes]
         vertices, tiles = meshes[kinds.index(kinds[-1])]
         return CoarseMesh(vertices, tiles, np.zeros(len(tiles), dtype=np.int64))
@@ -290,7 +291,8 @@ class _Ground:
     def misfit(self, patches: Patches) -> tuple[FloatArray, FloatArray]:
         """Distance of squares from the body and angle of their normals to its own, at most (m,), L and radians."""
         q = patches.places.shape[1] - 1
-        between = 0.5 * (lobatto(q)[1:] + lobatto(q)[:-1])[::2]
+        # the same of mirrored squares
+        between = 0.5 * (lobatto(q)[1:] + lobatto(q)[:-1])[[0, 2, -3, -1]]
         at = np.broadcast_to(between, (len(patches.places), len(between)))
         x, along, across = on_squares(patches.places, at, at)
         n = np.cross(along, across)

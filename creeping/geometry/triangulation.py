@@ -141,14 +141,16 @@ def quadrilaterals(
     *,
     cells: int = 48,
     fewest: int = ACROSS,
+    mirrored: bool = False,
 ) -> tuple[FloatArray, IntArray]:
     """Vertices (n, 3), L, and quadrilaterals (m, 4), counter-clockwise, that `triangulate` halves; see there.
 
-    There are ``fewest`` cells or more across each side of the box.
+    There are ``fewest`` cells or more across each side of the box. If ``mirrored``, those of a body whose mirrors are
+    the middle planes of the box are so, too.
     """
     box = checked_extent(bounds)
     for count in _counts(box, cells, fewest):
-        axes = _grid_axes(box, count, fewest)
+        axes = _grid_axes(box, count, fewest, mirrored=mirrored)
         values = _grid_values(level, axes)
         vertices, number = _cell_vertices(values, values < 0, axes)
         tiles = _around_edges(values < 0, number)
@@ -179,14 +181,19 @@ def _counts(box: FloatArray, cells: int, fewest: int) -> Iterator[int]:
         yield int(share * cells)
 
 
-def _grid_axes(box: FloatArray, cells: int, fewest: int) -> list[FloatArray]:
-    """Grid coordinates per axis, two cells beyond the box: cubic cells, but at least ``fewest`` across each side.
+def _grid_axes(box: FloatArray, cells: int, fewest: int, *, mirrored: bool = False) -> list[FloatArray]:
+    """Grid coordinates per axis, a cell or two beyond the box: cubic cells, but at least ``fewest`` across each side.
 
     Cells much flatter than long would miss the topology of a ring, hence cubes.
     """
     side = box[1] - box[0]
     count = np.clip(np.round(side / (np.prod(side) ** (1 / 3) / cells)), fewest, 1000).astype(int)
     spacing = side / count
+    if mirrored:
+        # the middle planes are halfway between grid points
+        numbers = [2 * (int(n) // 2 + 2) for n in count]
+        middle = 0.5 * (box[0] + box[1])
+        return [middle[k] + spacing[k] * (np.arange(n) - 0.5 * (n - 1)) for k, n in enumerate(numbers)]
     # an irrational shift keeps grid points off the symmetry planes, where F is often exactly 0
     low = box[0] - (2 + 0.1 * np.sqrt([2.0, 3.0, 5.0])) * spacing
     return [low[k] + spacing[k] * np.arange(count[k] + 6) for k in range(3)]
