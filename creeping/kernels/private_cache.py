@@ -4,7 +4,7 @@ numba unpickles and runs what it finds in its cache, and a fit or a map that som
 body.
 
 A folder is trusted if nobody but the user, root and the owner of the package can put files into it or replace it.
-creeping and scatterers, which do not import each other, both have this file; a test holds them equal.
+Both packages keep theirs by it.
 """
 
 import os
