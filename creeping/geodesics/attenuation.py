@@ -220,7 +220,7 @@ def _along(body: Surface, states: FloatArray, fine: Sliding, place: IntArray, ou
     def run(part: slice) -> None:
         kernel(_bent(body, states[part, :, :6], fine), fine.times, (*fine_rules(), DIP), place, out[part])
 
-    in_threads(run, len(states), seconds=1e-6 * states.shape[1], most=TOGETHER)
+    in_threads(run, len(states), most=TOGETHER)
 
 
 def _bent(body: Surface, states: FloatArray, fine: Sliding) -> FloatArray:

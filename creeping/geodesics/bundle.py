@@ -87,7 +87,7 @@ def _entered(body: Surface, x: FloatArray, p: FloatArray) -> FloatArray | None:
         def run(part: slice) -> None:
             refused.append(enter(*level, x[part], p[part], OFF_BODY * length, 1e-15 * length, NORMAL, out[part]))
 
-        in_threads(run, len(x), seconds=5e-8)
+        in_threads(run, len(x))
     return None if sum(refused) else out
 
 

@@ -179,7 +179,7 @@ def counted_states(
                 pause()
             taken.append(int(at[7]))
 
-        in_threads(run, len(states), seconds=None)
+        in_threads(run, len(states), even=True)
     failed = np.flatnonzero(~np.all(np.isfinite(out), axis=(1, 2)))
     if len(failed):
         raise IntegrationError(

@@ -59,7 +59,6 @@ def _traced(body: Any, states: FloatArray, times: FloatArray, rtol: float) -> Fl
         in_slices(
             lambda some: integrate_own(*parts, states[some], times[some], *controls, out[some]),
             len(states),
-            seconds=1e-5,
             multiple=CHUNK,
         )
     return out

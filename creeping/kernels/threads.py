@@ -1,9 +1,9 @@
 """Work on rays in slices, in as many threads as pay, that an interrupt ends within about a second.
 
 Compiled kernels release the interpreter, and no handler of a signal runs before they return. So they are given slices
-of some SLICE seconds, by the time that the last one took; slices end at multiples of the kernels' block, and results
-depend neither on them nor on the number of threads. Kernels whose single block may take longer return by themselves
-after a number of steps, and are called until they are done, with `pause` in between.
+of some SLICE seconds, by the time that the last one took, the first of them short; slices end at multiples of the
+kernels' block, and results depend neither on them nor on the number of threads. Kernels whose single block may take
+longer return by themselves after a number of steps, and are called until they are done, with `pause` in between.
 """
 
 import os
@@ -21,6 +21,8 @@ CHUNK = 64
 """Slices end at multiples of this, the kernels' block: results do not depend on them."""
 SLICE = 0.1
 """Seconds that a kernel may keep the signals waiting."""
+FIRST = 64
+"""Rows of the first slice, before it is known what one takes."""
 
 
 class _Stopped(BaseException):
@@ -73,7 +75,7 @@ def _pool(threads: int, process: int) -> Any:
 class _Slices:
     """Slices of range(count), handed out one after the other; unless ``even``, as long as their time allows."""
 
-    def __init__(self, count: int, first: float, most: int, multiple: int, *, even: bool) -> None:
+    def __init__(self, count: int, first: int, most: int, multiple: int, *, even: bool) -> None:
         self._count, self._most, self._multiple, self._even = count, max(multiple, most), multiple, even
         self._next, self._size = 0, self._whole(most if even else first)
         self._lock = threading.Lock()
@@ -97,7 +99,7 @@ class _Slices:
                 self._size = self._whole((part.stop - part.start) * min(4.0, max(0.25, share)))
 
 
-def in_slices(work: Callable[[slice], None], count: int, *, seconds: float = 1e-6, multiple: int = CHUNK) -> None:
+def in_slices(work: Callable[[slice], None], count: int, *, multiple: int = CHUNK) -> None:
     """Call ``work`` on slices that cover range(count), one after the other, in this thread.
 
     Parameters
@@ -105,12 +107,10 @@ def in_slices(work: Callable[[slice], None], count: int, *, seconds: float = 1e-
     work : callable
         What it does for a row must not depend on the slice.
     count : int
-    seconds : float
-        About what a row takes; it decides how long the first slice is.
     multiple : int
         Slices end at multiples of this.
     """
-    _Slices(count, SLICE / seconds, count + multiple, multiple, even=False).work(work)
+    _Slices(count, FIRST, count + multiple, multiple, even=False).work(work)
 
 
 def in_threads(
@@ -119,8 +119,9 @@ def in_threads(
     *,
     least: int = LEAST,
     multiple: int = CHUNK,
-    seconds: float | None = 1e-6,
+    first: int = FIRST,
     most: int | None = None,
+    even: bool = False,
 ) -> None:
     """Do what `in_slices` does, in as many threads as pay, at least ``least`` rows a thread.
 
@@ -128,11 +129,15 @@ def in_threads(
 
     Parameters
     ----------
-    work, count, seconds, multiple
-        As for `in_slices`; with ``seconds=None`` slices are equal, for kernels that come up by themselves.
+    work, count, multiple
+        As for `in_slices`.
     least : int
+    first : int
+        Rows of the first slice, where one may take long.
     most : int, optional
         Rows of the longest slice.
+    even : bool
+        Whether slices are equal, for kernels that come up by themselves.
     """
     threads = min(thread_count(), max(1, count // least))
     if getattr(_team, "stop", None) is not None:
@@ -143,7 +148,7 @@ def in_threads(
         # more slices than threads: rays of one region may cost more than those of another
         longest = -(-count // (4 * threads * multiple)) * multiple
     longest = min(longest, most or longest)
-    slices = _Slices(count, SLICE / (seconds or 1.0), longest, multiple, even=seconds is None)
+    slices = _Slices(count, first, longest, multiple, even=even)
     if threads == 1:
         slices.work(work)
         return

@@ -212,7 +212,7 @@ def occluded(body: Surface, points: FloatArray, direction: FloatArray, reach: Fl
             under = _dips(body, x[row], back[row], t[row, sample + 1], h[row, 0])
             hidden[part.start + row[under]] = True
 
-    in_slices(run, len(points), seconds=1e-5, multiple=SLICE)
+    in_slices(run, len(points), multiple=SLICE)
     return hidden
 
 

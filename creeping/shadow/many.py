@@ -116,7 +116,7 @@ def shadow_lines(body: Surface, directions: FloatArray, n_rays: int, *, every: b
                 mine = rows[part][there]
                 certain[mine] = sure[there] & take(mine, [one for one in nodes if one is not None])
 
-        in_threads(run, len(rows), least=LEAST, multiple=1, seconds=1e-3, most=TOGETHER)
+        in_threads(run, len(rows), least=LEAST, multiple=1, most=TOGETHER)
         onward, status[rows] = judged(v[rows], certain[rows], meshes.turn(tier), tier)
         rows = rows[onward]
     for row in np.flatnonzero(status == FOLLOWED):

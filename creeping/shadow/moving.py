@@ -10,9 +10,6 @@ from creeping.geometry.incident import rows_of
 from creeping.geometry.surface import Surface
 from creeping.kernels.threads import in_threads
 
-EACH = 2e-7
-"""Rough time of a point, seconds: it sizes the slices."""
-
 
 class Moved(NamedTuple):
     """Points on lines (n, 3), L, with the lines' unit tangents (n, 3) and kappa_n(q) (n,), 1/L.
@@ -53,5 +50,5 @@ def moved_onto_lines(body: Surface, waves: FloatArray, points: FloatArray, *, re
             out = tangents[part], curvature[part], left[part]
             move(*parts[:2], waves[part], found[part], reach, steps, work_space(), *out)
 
-        in_threads(run, n, seconds=EACH)
+        in_threads(run, n)
     return Moved(found, tangents, curvature, left)

@@ -58,7 +58,7 @@ def critical_distances(body: Surface, waves: FloatArray) -> FloatArray:
                 (first, last), (low, high) = along[crossed[::2]].T, value.reshape(-1, 2).T
                 least[row] = np.min(np.abs(low + first / (first - last) * (high - low)))
 
-    in_slices(run, len(rows), seconds=2e-5, multiple=1)
+    in_slices(run, len(rows), multiple=1)
     for row in np.flatnonzero(rows[:, 3]):
         height = clearance(body, -rows[row, :3] / rows[row, 3])
         if height < size(body):

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import creeping as cr
-import scatterers as sc
 from creeping.kernels.callback import BlockCallback
 from tests.patience import HANGS, until
+from tests.plain_body import PlainEllipsoid
 
 ROOT = Path(__file__).parents[2]
 BEGIN = """
@@ -35,8 +35,9 @@ LONG = {
     "far field by rays": "a = fan(), cr.fibonacci_directions(100_000), 90.0; ready()\n"
     "while True: cr.far_field(a[0], a[1], wavenumber=a[2], method='rays')",
     "sweep": "d = cr.fibonacci_directions(10**5); ready(); cr.sweep_directions(direct, d, wavenumbers=40.0)",
-    "numpy methods": "class Plain(sc.Ellipsoid): compiled = None\n"
-    "direct, s = cr.DirectFlow(Plain(1.0, 0.8, 0.6)), rays(20_000, 12); direct.transport(s[:64], np.ones(1)); ready()\n"
+    "numpy methods": "from tests.plain_body import PlainEllipsoid\n"
+    "direct, s = cr.DirectFlow(PlainEllipsoid(1.0, 0.8, 0.6)), rays(20_000, 12)\n"
+    "direct.transport(s[:64], np.ones(1)); ready()\n"
     "direct.transport(s, np.array([99.0]))",
 }
 QUICK = (("flow of one block", 2), ("numpy methods", 1))
@@ -84,9 +85,6 @@ def interrupted(command, folder, wait, *, again=False):
 
 
 def test_an_interrupt_meets_a_callback_before_it_catches(monkeypatch, interruptible):
-    class Plain(sc.Ellipsoid):
-        compiled = None
-
     views, calls = BlockCallback._views, []
 
     def interrupting(callback, fields):
@@ -96,7 +94,7 @@ def test_an_interrupt_meets_a_callback_before_it_catches(monkeypatch, interrupti
         return views(callback, fields)
 
     monkeypatch.setattr(BlockCallback, "_views", interrupting)
-    body, handler = Plain(1.0, 0.8, 0.6), signal.getsignal(signal.SIGINT)
+    body, handler = PlainEllipsoid(1.0, 0.8, 0.6), signal.getsignal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt):
         cr.trace(body, [[1.0, 0.0, 0.0]], [[0.0, 0.0, 1.0]], np.ones(1))
     assert signal.getsignal(signal.SIGINT) is handler

@@ -19,11 +19,12 @@ from creeping.geodesics.states import pack
 from creeping.kernels import threads
 from creeping.kernels.threads import in_slices, in_threads
 from creeping.phaseflow.coordinates import rotation
+from tests.plain_body import PlainEllipsoid
 
 
 @pytest.mark.parametrize("count", [0, 63, 70_001])
 @pytest.mark.parametrize("several", ["1", "3"])
-@pytest.mark.parametrize("options", [{}, {"seconds": None, "most": 130}, {"seconds": 1.0}])
+@pytest.mark.parametrize("options", [{}, {"even": True, "most": 130}, {"first": 1}])
 def test_slices_cover_everything_once(count, several, options, monkeypatch):
     monkeypatch.setenv("CREEPING_THREADS", several)
     seen, ends = np.zeros(count, int), []
@@ -46,7 +47,7 @@ def test_slices_are_as_long_as_their_time_allows(monkeypatch):
         parts.append(part.stop - part.start)
         time.sleep(2e-6 * parts[-1])
 
-    in_slices(work, 40_000, seconds=1.0)
+    in_slices(work, 40_000)
     assert parts[0] == 64 and 256 < max(parts) <= 2048
 
 
@@ -102,7 +103,7 @@ def test_an_error_in_one_thread_ends_the_others(monkeypatch):
         done.append(part)
 
     with pytest.raises(ArithmeticError, match="the first"):
-        in_threads(work, 64_000, seconds=1.0, most=64)
+        in_threads(work, 64_000, most=64)
     assert len(done) < 100
 
 
@@ -117,16 +118,15 @@ def test_an_interrupt_waits_for_the_slices_and_takes_no_more(monkeypatch, interr
 
     threading.Timer(0.2, lambda: __import__("_thread").interrupt_main()).start()
     with pytest.raises(KeyboardInterrupt):
-        in_threads(work, 64_000, seconds=1.0, most=64)
+        in_threads(work, 64_000, most=64)
     assert sorted(begun) == sorted(ended) and len(begun) < 60
     time.sleep(0.2)
     assert len(begun) < 60
 
 
 def test_a_callback_that_has_failed_is_not_called_again():
-    class Failing(sc.Ellipsoid):
+    class Failing(PlainEllipsoid):
         calls = 0
-        compiled = None
 
         def hessian(self, points):
             Failing.calls += 1

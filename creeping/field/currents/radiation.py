@@ -39,10 +39,6 @@ from creeping.geometry.memo import memo
 from creeping.geometry.surface import Surface
 from creeping.kernels.threads import in_threads
 
-SHARES = {"least": 32, "multiple": 8}
-"""Fewest directions or points worth a thread, and what slices of them end at."""
-EACH = 5e-9
-"""Seconds, about, of one direction seen from one node."""
 TOLERANCE = 1e-9
 """Of the transform, as a share of its largest value."""
 PER_NODE, PER_CELL = 1500.0, 60.0
@@ -56,8 +52,6 @@ LOW = 0.3
 """T up to which W rises."""
 BLOCK = 16
 """Nodes that are looked at together, neighbours in space."""
-PAIR = 2e-9
-"""Seconds of one pair, about."""
 VECTOR = 2.5
 """What a pair of a conductor takes of that, both polarisations."""
 MOST_PAIRS = 4e9
@@ -88,8 +82,8 @@ def phase_sums(points: FloatArray, weights: ComplexArray, directions: FloatArray
     in_threads(
         lambda part: distant(turns, real, imaginary, directions[part], out[part]),
         len(directions),
-        seconds=EACH * len(points),
-        **SHARES,
+        least=32,
+        multiple=8,
     )
     return np.asarray(out[:, :columns] + 1j * out[:, columns:])
 
@@ -156,8 +150,8 @@ def field_of_scalar(
     in_threads(
         lambda part: near(*columns, *pairs, wavenumber, at[part], out[part]),
         len(at),
-        seconds=EACH * len(points),
-        **SHARES,
+        least=32,
+        multiple=8,
     )
     field = out[:, : len(nothing)] + 1j * out[:, len(nothing) :]
     return np.asarray(field if given is not None and given.ndim > 1 else field[:, 0])
@@ -206,8 +200,8 @@ def _vector_sums(
     in_threads(
         lambda part: kernel(columns, real, imaginary, wavenumber, at[part], out[part]),
         len(at),
-        seconds=EACH * len(points),
-        **SHARES,
+        least=32,
+        multiple=8,
     )
     return np.asarray(out[:, :3] + 1j * out[:, 3:])
 
@@ -261,7 +255,7 @@ def received(
         given = (*points, of, *sources, others, BLOCK, *weights, k, LOW, soft)
         from_above(*given, part.start, part.stop, out)
 
-    in_threads(work, len(of[1]), least=4, multiple=1, seconds=PAIR * BLOCK * len(single))
+    in_threads(work, len(of[1]), least=4, multiple=1)
     found = np.empty(len(out), dtype=complex)
     found[place] = out[:, 0] + 1j * out[:, 1]
     return found
@@ -285,7 +279,7 @@ def received_vectors(
     def work(part: slice) -> None:
         vectors_from_above(*points, of, sources[0], others, BLOCK, J, k, LOW, part.start, part.stop, out)
 
-    in_threads(work, len(of[1]), least=4, multiple=1, seconds=PAIR * VECTOR * BLOCK * len(strength))
+    in_threads(work, len(of[1]), least=4, multiple=1)
     found = np.empty((len(out), 3, waves), dtype=complex)
     found[place] = np.moveaxis(out[..., :3] + 1j * out[..., 3:], 1, 2)
     return found

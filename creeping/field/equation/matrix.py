@@ -326,7 +326,7 @@ class Matrix:
             else:
                 scalar_pairs(x, normals, scale, y, sides, to, layer, k, tilt, part.start, part.stop, both)
 
-        in_threads(work, m, least=8, multiple=1, seconds=EACH * n * (VECTOR if self.vector else 1.0))
+        in_threads(work, m, least=8, multiple=1)
         targets, columns, near = self.near(places, kind)
         share = scale[targets, None] * (1 / (2 * np.pi * self.root))[columns]
         if self.vector:
@@ -385,7 +385,7 @@ class Matrix:
         def work(part: slice) -> None:
             tangent_rows(*given, part.start, part.stop, out)
 
-        in_threads(work, len(targets), least=64, multiple=1, seconds=1e-5)
+        in_threads(work, len(targets), least=64, multiple=1)
         return out
 
     @cached_property

@@ -278,7 +278,7 @@ class SplitSums:
         def work(part: slice) -> None:
             near_vectors(*given, *table, part.start, part.stop, out)
 
-        in_threads(work, m, least=64, multiple=1, seconds=1e-8 * len(J))
+        in_threads(work, m, least=64, multiple=1)
         return np.asarray(np.moveaxis(out[..., :3] + 1j * out[..., 3:], 1, 2))
 
     def _waves(self) -> Iterator[tuple[int, Any]]:
@@ -346,12 +346,11 @@ class SplitSums:
         y, sides = (np.ascontiguousarray(part[cells.order].T) for part in (self._nodes, self._sides))
         weights = self._weights[cells.order]
         counts = np.zeros(m + 1, dtype=np.int64)
-        seconds = 1e-8 * len(self._nodes)
 
         def count(part: slice) -> None:
             count_near(x, y, *cells.grid, kernel.reach, part.start, part.stop, counts[1:])
 
-        in_threads(count, m, least=64, multiple=1, seconds=seconds)
+        in_threads(count, m, least=64, multiple=1)
         starts = np.cumsum(counts)
         columns, entries = np.empty(starts[-1], dtype=np.int32), np.empty(starts[-1], dtype=np.float32)
         given = x, normals, y, sides, weights, *cells.grid, cells.order
@@ -361,7 +360,7 @@ class SplitSums:
         def fill(part: slice) -> None:
             fill_near(*given, *table, *tilt, starts, part.start, part.stop, columns, entries)
 
-        in_threads(fill, m, least=64, multiple=1, seconds=seconds)
+        in_threads(fill, m, least=64, multiple=1)
         small = starts.astype(np.int32) if starts[-1] < 2**31 else starts
         self._made[kind] = csr_array((entries, columns, small), (m, len(weights)))
         return self._made[kind]

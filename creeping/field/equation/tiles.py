@@ -205,7 +205,7 @@ class Tiles:
         def work(part: slice) -> None:
             tile_rows(*given, *rest, part.start, part.stop, out)
 
-        in_threads(work, self.count, least=4, multiple=1, seconds=1e-3)
+        in_threads(work, self.count, least=4, multiple=1)
         return np.asarray(out[:, : mode + 1] + 1j * out[:, 3 : mode + 4])
 
     def with_nodes(self, p: int) -> "Tiles":

@@ -53,8 +53,6 @@ from creeping.kernels.threads import in_threads
 
 STEPPED = ("curvature", "across", "spreading", "torsion", "lean", "potential")
 """What steps ask of a profile, in the kernel's order."""
-SECONDS = 6e-9
-"""Of one pole, unknown, step and ray."""
 
 ONE_WAY, OPTICS, VARYING, LEAK = 0.4, 1.5, 0.08, 1e-4
 EVEN = 0.4
@@ -220,11 +218,8 @@ class _March:
                 blocks[-1].append(ray)
             else:
                 blocks.append([ray])
-        costs = [ORDER * counts[block].max() * LANES * 100 * SECONDS for block in blocks]
         if blocks:
-            in_threads(
-                lambda part: self._march_blocks(blocks[part]), len(blocks), least=2, multiple=1, seconds=max(costs)
-            )
+            in_threads(lambda part: self._march_blocks(blocks[part]), len(blocks), least=2, multiple=1, first=1)
         return MarchedRays(
             s=self.s,
             values=self.values,

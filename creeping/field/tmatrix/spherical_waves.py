@@ -33,8 +33,6 @@ from creeping.kernels.threads import in_threads
 
 BLOCK = 256
 """Points whose waves are made at a time: tables that a cache holds."""
-EACH = 2e-8
-"""Seconds of a wave at a point."""
 
 
 def count(order: int) -> int:
@@ -106,7 +104,7 @@ def regular(points: FloatArray, wavenumber: float, order: int, *, radial: bool =
                 values *= spherical_jn(np.arange(order + 1), wavenumber * r[:, None])[:, deg]
             np.multiply(values, turn[:, m + order], out=out[at])
 
-    in_threads(work, len(points), least=BLOCK, multiple=1, seconds=EACH * count(order))
+    in_threads(work, len(points), least=BLOCK, multiple=1)
     return out
 
 

@@ -35,7 +35,7 @@ from creeping.field.arguments import fock_parameter
 from creeping.field.boundary import Boundary
 from creeping.field.results.point_result import FieldStatus
 from creeping.field.waves.far_geometry import fan_strips
-from creeping.field.waves.gaussian_beams import SECONDS, WIDTH, GaussianBeams, beam_length, turned_by
+from creeping.field.waves.gaussian_beams import WIDTH, GaussianBeams, beam_length, turned_by
 from creeping.field.waves.ray_sums import (
     FADED,
     LOST,
@@ -57,6 +57,8 @@ from creeping.rays.fan import RayFan
 from creeping.rays.shedding import ShedRays
 from creeping.rays.strips import Strip
 
+SECONDS = 2e-8
+"""Of a beam's block of steps at one point."""
 DENSE, STEPS = 6.0, 8.0
 """Beams a wavelength along the line, and steps a wavelength along them."""
 FEWEST = 64

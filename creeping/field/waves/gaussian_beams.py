@@ -27,8 +27,6 @@ REACH = 0.9
 """How far a beam reaches, in terms of a: (ka)^(1/2) of its widths, so that nothing is lost from ka = 10 on."""
 MOST_TURNED = 0.5
 """Bound of |k_c/k - 1|, which is tau/2m^2 of a mode (F24) and infinite where y is 0."""
-SECONDS = 2e-8
-"""Of a beam's block of steps at one point, for shares of threads alone."""
 
 
 def beam_length(body: Surface) -> float:
@@ -107,7 +105,7 @@ class GaussianBeams:
         def work(part: slice) -> None:
             add_beams(points[part], *table, self.V, self.lean, out[0, part], out[1, part])
 
-        in_threads(work, len(points), least=64, multiple=1, seconds=SECONDS * self.balls[1].size)
+        in_threads(work, len(points), least=64, multiple=1)
         return out
 
 

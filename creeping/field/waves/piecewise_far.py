@@ -89,8 +89,6 @@ USUAL = 0.95
 """Share of the area whose curvature the sides go by: next to a tip it is without bound."""
 OPTICS_OUTWARD = 1e-6
 """Distance from the body, in its sizes, at which a tile is asked whether the wave comes to it."""
-EACH, SHARES = 3e-8, {"least": 8, "multiple": 4}
-"""Seconds that a tile takes in one direction, and how directions are shared among threads."""
 FLAT = 1e-6
 """Curvature, in inverse sizes, below which a tile is flat."""
 
@@ -401,8 +399,7 @@ def phase_sums(corners: FloatArray, vectors: FloatArray, wavenumber: float, weig
     # the kernel knows no complex weights
     columns = np.ascontiguousarray(doubled * np.concatenate([weights.real, weights.imag], axis=1))
     q, out = wavenumber * vectors, np.empty((len(vectors), 2, columns.shape[1]))
-    seconds = EACH * len(corners)
-    in_threads(lambda part: triangle_waves(corners, q[part], columns, out[part]), len(q), seconds=seconds, **SHARES)
+    in_threads(lambda part: triangle_waves(corners, q[part], columns, out[part]), len(q), least=8, multiple=4)
     sums = out[:, 0] + 1j * out[:, 1]
     width = weights.shape[1]
     return np.asarray(sums[:, :width] + 1j * sums[:, width:])

@@ -42,8 +42,6 @@ from creeping.rays.quantities import RayPoints
 SECOND_ORDER = (0.5, 0.9)
 """ξ between which the series of second order takes over."""
 
-EACH = 5e-6
-"""Seconds of a block of the sum, about."""
 SOURCE_VARIES, NEXT = 1 / 16, 2.0
 """Weight of τ³ e ρ1'/m1 in the error, and how much is added to |τ| of the first mode at ξ = 0."""
 
@@ -284,7 +282,7 @@ def _by_modes(
     def work(part: slice) -> None:
         mode_orders(numbers, modes, wavenumber, transverse_weight, BETA, part.start, part.stop, out)
 
-    in_slices(work, numbers.shape[1] // BLOCK, seconds=EACH, multiple=1)
+    in_slices(work, numbers.shape[1] // BLOCK, multiple=1)
     out = out[:, : len(rays.time)]
     return out[0] + 1j * out[1], out[2] + 1j * out[3]
 

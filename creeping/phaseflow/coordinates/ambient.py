@@ -96,4 +96,4 @@ class AmbientModel:
                     kernel(*place, *parts[:2], *tables, leap.time, min(TOGETHER, count - done), off, states[part])
                     pause()
 
-            in_threads(run, len(states), seconds=1e-6 * min(count, TOGETHER))
+            in_threads(run, len(states))

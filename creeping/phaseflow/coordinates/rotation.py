@@ -161,7 +161,7 @@ class CompiledModel:
             self._to_body(out[part].reshape(-1, lanes))
 
         # shares that are ordered stay small, so that what is known of their rays stays in the cache
-        in_threads(run, len(states), most=SHARE if many else None, seconds=None)
+        in_threads(run, len(states), most=SHARE if many else None, even=True)
         return out
 
     def doubled(self, grid: Grid, leap: Leap, nodes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -13,6 +13,7 @@ import creeping as cr
 import scatterers as sc
 from creeping.phaseflow.tuning.flow_choice import tuned_direct
 from creeping.phaseflow.tuning.nominal_cost import direct_seconds, evaluation_seconds, map_seconds, tracing_cost
+from tests.plain_body import PlainEllipsoid
 
 ROOT = Path(__file__).parents[3]
 BUILD = """
@@ -70,16 +71,10 @@ def test_numbers_of_numpy_make_the_same_choice():
     assert again == first
 
 
-class Plain(sc.Ellipsoid):
-    """An ellipsoid by its numpy methods."""
-
-    compiled = None
-
-
 def test_costs_are_in_the_order_of_what_they_stand_for():
     short, long = sc.Implicit("x*x + y*y + 2*z*z - 1"), sc.Implicit("x*x + y*y + exp(0.1*sin(x))*z*z - 1")
     sampled = sc.Gridded.sampled(sc.Ellipsoid(1.0, 0.8, 0.6), 24)
-    found = [evaluation_seconds(one) for one in (short, long, sampled, Plain(1.0, 0.8, 0.6))]
+    found = [evaluation_seconds(one) for one in (short, long, sampled, PlainEllipsoid(1.0, 0.8, 0.6))]
     assert found == sorted(found) and found[-1] > 100 * found[0]
     assert evaluation_seconds(sc.Sphere(speed="1 + x")) > evaluation_seconds(sc.Sphere())
     # twice the body: the same ray is twice as long
