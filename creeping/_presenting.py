@@ -9,8 +9,6 @@ from html import escape
 from importlib import import_module
 from typing import Any
 
-import numpy as np
-
 _module = ""
 
 
@@ -31,11 +29,15 @@ def content(value: Any) -> str:
 
     Examples
     --------
+    >>> import numpy as np
     >>> content(np.array([[3.0, np.nan], [-1.0, 2.0]])), content(np.array([4 + 3j, 0]))
     ('2 x 2, -1 to 3, 1 not finite', '2 complex, size up to 5')
     >>> content(np.array(["rays", "lit", "rays"])), content(np.array([True, False])), content((1.0, "m"))
-    ('1 lit, 2 rays', '1 False, 1 True', "(1.0, 'm')")
+    ('lit (1), rays (2)', 'False (1), True (1)', "(1.0, 'm')")
     """
+    # not at the head: ``import creeping`` brings no numpy
+    import numpy as np
+
     named = value._asdict() if hasattr(value, "_asdict") else value
     if isinstance(named, dict):
         return "; ".join(f"{name}: {content(one)}" for name, one in named.items()) or "none"
@@ -45,7 +47,7 @@ def content(value: Any) -> str:
     if value.dtype.kind not in "fc":
         seen, counts = np.unique(value, return_counts=True)
         if len(seen) <= 8:
-            return ", ".join(f"{count} {one}" for one, count in zip(seen, counts, strict=True)) or "none"
+            return ", ".join(f"{one} ({count})" for one, count in zip(seen, counts, strict=True)) or "none"
     shape = " x ".join(map(str, value.shape)) or "one"
     finite = value[np.isfinite(value)] if value.dtype.kind in "iufc" else value[:0]
     if value.dtype.kind == "c":
