@@ -87,8 +87,8 @@ class Drawn(Shown):
             the last value of a cell, and ``.figure.savefig(path)`` writes it. For a window, give axes of pyplot.
         **options
             ``legend=True`` adds a legend to given axes; a new figure has one. The other options depend on the type of
-            the result; see `line_plots`, `far_cuts`, `plane_pictures`, `coupling_pictures`, `echo_pictures` and
-            `t_matrix_pictures` of `creeping.plotting`:
+            the result; see `line_plots`, `far_cuts`, `plane_pictures`, `coupling_pictures` and `echo_pictures` of
+            `creeping.plotting`:
 
             - `ShadowLine`, `ShadowCurve`, `RayFan` (``plot_line``): ``kind="parameters"``, the plane of (theta, phi) in
               degrees, or ``kind="3d"``, which 3-D axes imply; ``curves=``, iso-phase curves to draw as well;

@@ -157,7 +157,7 @@ def _mesh(
     if output is None:
         return
     from creeping.commands.resuming import make_folder
-    from creeping.plotting.mesh_picture import MeshValues, mesh_picture
+    from creeping.plotting.coloured_body import MeshValues, mesh_picture
 
     make_folder(output)
     shown = MeshValues(mesh.vertices, mesh.triangles, quality.badness, quality.bad, Path(body).name)

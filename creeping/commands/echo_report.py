@@ -236,12 +236,11 @@ def _drawn(
     several, band = len(echo.azimuth) > 1, len(echo.wavenumbers) > 1
     jobs: dict[str, Callable[[Path], None]] = {}
     if several and band:
-        jobs[f"{stem}_map.png"] = lambda path: plotting.echo_map_picture(path, echo, **words)
-    elif several:
-        jobs[f"{stem}.png"] = lambda path: plotting.echo_cut_picture(path, echo, **words)
-        jobs[f"{stem}_polar.png"] = lambda path: plotting.echo_cut_picture(path, echo, kind="polar", **words)
-    elif band:
-        jobs[f"{stem}.png"] = lambda path: plotting.echo_band_picture(path, echo, **words)
+        jobs[f"{stem}_map.png"] = lambda path: plotting.echo_picture(path, echo, **words)
+    elif several or band:
+        jobs[f"{stem}.png"] = lambda path: plotting.echo_picture(path, echo, **words)
+    if several and not band:
+        jobs[f"{stem}_polar.png"] = lambda path: plotting.echo_picture(path, echo, kind="polar", **words)
     if profiles:
         jobs["range.png"] = lambda path: plotting.range_picture(path, profiles, echo, span, **words)
     names = []

@@ -6,7 +6,7 @@ Types are known by their names, so that to draw one result does not import the m
 from creeping._typing import Any
 from creeping.errors import InvalidInputError
 from creeping.files.polylines import polydata
-from creeping.plotting import coupling_pictures, echo_pictures, far_cuts, line_plots, plane_pictures, t_matrix_pictures
+from creeping.plotting import coupling_pictures, echo_pictures, far_cuts, line_plots, plane_pictures
 
 PLOTS = {
     "ShadowLine": line_plots.plot_line,
@@ -21,7 +21,7 @@ PLOTS = {
     "ImpulseResponse": echo_pictures.plot_impulse,
     "RangeProfile": echo_pictures.plot_profile,
     "Echo": echo_pictures.plot_echo,
-    "TMatrix": t_matrix_pictures.plot_t_matrix,
+    "TMatrix": echo_pictures.plot_t_matrix,
 }
 """What draws a result of a type on matplotlib axes."""
 POLYLINES = {
