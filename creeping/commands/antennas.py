@@ -175,7 +175,7 @@ def _waves(wavenumber: float | None, frequency: str | None, sound_speed: float |
     """Wavenumbers (n,), 1/L, and their frequencies, Hz, or None."""
     import numpy as np
 
-    from creeping.commands.wave import asked_wavenumber
+    from creeping.commands.forecast import asked_wavenumber
     from creeping.field.frequency import frequency as hertz_of
     from creeping.field.frequency import wavenumber as wavenumber_of
 
@@ -255,7 +255,7 @@ def _draw(path: Path, ports: Ports, found: Sequence[Any], hertz: Any, title: str
 
 def readable(ports: Ports, found: Sequence[Any], hertz: Any, summary: dict[str, Any], output: Path) -> str:
     """The summary in a few lines: each pair at the first and the last frequency."""
-    from creeping.commands.wave import frequency_words
+    from creeping.commands.forecast import frequency_words
 
     def wave(number: int) -> str:
         return f"k = {found[number].wavenumber:g}" if hertz is None else frequency_words(float(hertz[number]))

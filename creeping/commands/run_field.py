@@ -10,9 +10,8 @@ import numpy as np
 from creeping import files, plotting
 from creeping._typing import ArrayLike, FloatArray
 from creeping.commands.body import Output, each_once, write_tables
-from creeping.commands.forecast import Forecast, forecast, radar_of
+from creeping.commands.forecast import Forecast, asked_wavenumber, forecast, frequency_words, radar_of
 from creeping.commands.resuming import Unfinished
-from creeping.commands.wave import asked_wavenumber, frequency_words
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.body_currents import cached_currents
 from creeping.field.boundary import BoundaryLike, parse_boundary
