@@ -95,7 +95,7 @@ def write_planes(
 def _options(plane: Plane, job: Job, source: RayFan | Solution) -> dict[str, Any]:
     """Arguments of `field_cut`, and of `cut_grid`."""
     axes = {} if plane.axes is None else {"across": plane.axes[0], "up": plane.axes[1]}
-    return (job.asked if isinstance(source, RayFan) else {}) | axes | {"step": plane.step}
+    return (job.wave if isinstance(source, RayFan) else {}) | axes | {"step": plane.step}
 
 
 def _polarisation(job: Job) -> dict[str, Any]:
