@@ -49,8 +49,6 @@ Size = Annotated[
 ]
 Folder = Annotated[Path, Parameter(name=["-o", "--output"], group=options.OUTPUT, help="Folder for the results.")]
 
-NEAR = 0.02
-"""Distance from the body, in its sizes, up to which a port is put on it."""
 MOST = 100_000
 """Pairs of ports times frequencies."""
 _VECTOR = r"([^,/=]+),([^,/=]+),([^,/=]+)"
@@ -201,7 +199,8 @@ def _on_body(shape: Any, ports: Ports) -> tuple[Any, str]:
         raise InvalidInputError(rays_refused(shape))
     placed = project(shape, ports.points)
     off = np.linalg.norm(placed - ports.points, axis=1)
-    if bad := [name for name, far in zip(ports.names, off, strict=True) if not far <= NEAR * size(shape)]:
+    # a port is put on the body from a fiftieth of its size
+    if bad := [name for name, far in zip(ports.names, off, strict=True) if not far <= 0.02 * size(shape)]:
         raise InvalidInputError(
             f"--port {', '.join(bad)}: off the body by up to {np.nanmax(off):.3g} {unit_of(shape)}; give places on it"
         )

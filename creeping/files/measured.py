@@ -18,8 +18,12 @@ from creeping._typing import FloatArray
 from creeping.errors import InvalidInputError
 from creeping.storage.reading import opened
 
+MOST_BYTES = 200_000_000
+"""Largest file that is read."""
 MOST_ROWS, MOST_NUMBERS = 1_000_000, 20_000_000
 """Rows of a table, and numbers in all of them."""
+LONGEST = 65_536
+"""Characters of a line."""
 HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "ghz": 1e9}
 _ANGLE = re.compile(r"(angle|azimuth|phi|elev|theta|aspect|incidence|deg|(?<![a-z])(az|el)(?![a-z]))")
 _OTHER = re.compile(r"(phase|error|uncertain|unresolved|method|(?<![a-z])(re|im)(?![a-z]))")
@@ -99,7 +103,7 @@ def _table(file: Path) -> tuple[list[str], FloatArray]:
     headers: list[list[str]] = []
     # a list of lists would take ten times the memory
     numbers, rows, columns, bare = array("d"), 0, 0, False
-    for number, line in lines_of(file, 200_000_000, 65_536):
+    for number, line in lines_of(file, MOST_BYTES, LONGEST):
         comment = line.startswith(("#", "%", "!", "//"))
         cells = _cells(line.lstrip("#%!/ ") if comment else line)
         values = [_number(cell) for cell in cells]

@@ -19,7 +19,7 @@ from creeping.field.results.impulse import range_profile
 from creeping.field.tmatrix.patterns import degrees_of
 from creeping.geometry.directions import directions_from_azimuth_elevation
 from creeping.plotting import pages
-from creeping.plotting.far_cuts import COMPONENTS, QUANTITIES, Curve, band_words, draw_cut, heights_of
+from creeping.plotting.far_cuts import COMPONENTS, QUANTITIES, Curve, draw_curves, draw_cut, heights_of
 
 if TYPE_CHECKING:
     from creeping.field.results.comparison import Comparison
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
 SPAN = 60.0
 """Range of levels, dB."""
-PER_LOBE = 8
-"""Pixels from a null of |f(d, -d)|, of degree 2L in each angle, to the next."""
 SPANS = {"backscatter": 50.0, "waves": 120.0}
 """Range of levels of each kind of picture of a T-matrix, dB."""
 
@@ -86,17 +84,9 @@ def draw_echo_band(ax: Any, echo: "Echo", span: float = SPAN) -> None:
     """Draw an echo against frequency at its first angle."""
     curves = _curves(echo, (0, slice(None)))
     low, high = heights_of(curves, span)
-    name = band_words(curves, low, high)
-    curves = _told_if_low(curves, low)
     scale, unit = suited(float(echo.hertz.max()))
     x = echo.hertz / scale
-    for curve in reversed(curves):
-        floor = low - (high - low)
-        if curve.band is not None:
-            band = np.maximum(curve.band, floor)
-            ax.fill_between(x, *band, label=name, color=curve.style["color"], alpha=0.18, linewidth=0)
-            name = "_one entry is enough"
-        ax.plot(x, np.maximum(curve.levels, floor), label=curve.label, **curve.style)
+    draw_curves(ax, x, _told_if_low(curves, low), (low, high))
     doubtful = echo.unresolved[:, 0].any(axis=0)
     if doubtful.any():
         ax.plot(x[doubtful], np.full(doubtful.sum(), low), "|", color=pages.GREY, clip_on=False, label="unresolved")
@@ -444,7 +434,8 @@ def averages_picture(
 
 
 def _draw_backscatter(ax: Any, T: "TMatrix", component: str | None, span: float) -> None:
-    count = PER_LOBE * (2 * T.order + 1) // 2
+    # eight pixels from a null of |f(d, -d)|, of degree 2L in each angle, to the next
+    count = 8 * (2 * T.order + 1) // 2
     elevation, azimuth = np.linspace(-90.0, 90.0, count + 1), np.linspace(-180.0, 180.0, 2 * count + 1)
     both = np.meshgrid(np.radians(azimuth), np.radians(elevation))
     f = T.backscatter(-directions_from_azimuth_elevation(*map(np.ravel, both))).total
