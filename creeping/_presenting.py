@@ -1,9 +1,11 @@
-"""How results show themselves without knowing pictures: they ask a presenter that a layer above them has named.
+"""How results show themselves: a table of their attributes for notebooks, and pictures without knowing how to draw.
 
-The root of the package names the module; it is imported when first asked, so that ``import creeping`` brings no
-drawing library.
+For pictures they ask a presenter that a layer above them has named. The root of the package names the module; it is
+imported when first asked, so that ``import creeping`` brings no drawing library.
 """
 
+from dataclasses import fields
+from html import escape
 from importlib import import_module
 from typing import Any
 
@@ -11,7 +13,7 @@ _module = ""
 
 
 def present_with(module: str) -> None:
-    """Name the module whose ``html``, ``plot`` and ``to_polydata`` show results."""
+    """Name the module whose ``plot`` and ``to_polydata`` draw results."""
     global _module
     _module = module
 
@@ -22,6 +24,40 @@ def brief(value: object, width: int = 72) -> str:
     return text if len(text) <= width else f"{text[: width - 3]}..."
 
 
+def content(value: Any) -> str:
+    """What an attribute holds, in words: of an array its shape and range, or how often each word, code or flag occurs.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> content(np.array([[3.0, np.nan], [-1.0, 2.0]])), content(np.array([4 + 3j, 0]))
+    ('2 x 2, -1 to 3, 1 not finite', '2 complex, size up to 5')
+    >>> content(np.array(["rays", "lit", "rays"])), content(np.array([True, False])), content((1.0, "m"))
+    ('lit (1), rays (2)', 'False (1), True (1)', "(1.0, 'm')")
+    """
+    # not at the head: ``import creeping`` brings no numpy
+    import numpy as np
+
+    named = value._asdict() if hasattr(value, "_asdict") else value
+    if isinstance(named, dict):
+        return "; ".join(f"{name}: {content(one)}" for name, one in named.items()) or "none"
+    if not isinstance(value, np.ndarray):
+        text = brief(value, 200)
+        return type(value).__name__ if "array(" in text else text
+    if value.dtype.kind not in "fc":
+        seen, counts = np.unique(value, return_counts=True)
+        if len(seen) <= 8:
+            return ", ".join(f"{one} ({count})" for one, count in zip(seen, counts, strict=True)) or "none"
+    shape = " x ".join(map(str, value.shape)) or "one"
+    finite = value[np.isfinite(value)] if value.dtype.kind in "iufc" else value[:0]
+    if value.dtype.kind == "c":
+        size = f" complex, size up to {np.abs(finite).max():.6g}" if finite.size else " complex"
+    else:
+        size = f", {finite.min():.6g} to {finite.max():.6g}" if finite.size else ""
+    missing = value.size - finite.size if value.dtype.kind in "fc" else 0
+    return shape + size + f", {missing} not finite" * bool(missing)
+
+
 class Shown:
     """A result with a table for notebooks."""
 
@@ -29,8 +65,11 @@ class Shown:
     __slots__ = ()
 
     def _repr_html_(self) -> str:
-        """Table of what it is, how large, how accurate and what is wrong, for notebooks."""
-        return str(import_module(_module).html(self))
+        """What it says of itself and a table of what it holds: no script, no style sheet, nothing from elsewhere."""
+        left, rows = ' style="text-align:left"', ""
+        for name in (one.name for one in fields(self) if not one.name.startswith("_")):  # type: ignore[arg-type]
+            rows += f'<tr><th scope="row"{left}>{name}</th><td{left}>{escape(content(getattr(self, name)))}</td></tr>'
+        return f"<pre>{escape(repr(self))}</pre><table><tbody>{rows}</tbody></table>"
 
 
 class Drawn(Shown):
@@ -48,8 +87,8 @@ class Drawn(Shown):
             the last value of a cell, and ``.figure.savefig(path)`` writes it. For a window, give axes of pyplot.
         **options
             ``legend=True`` adds a legend to given axes; a new figure has one. The other options depend on the type of
-            the result; see `line_plots`, `far_cuts`, `plane_pictures`, `coupling_pictures`, `echo_pictures` and
-            `t_matrix_pictures` of `creeping.plotting`:
+            the result; see `line_plots`, `far_cuts`, `plane_pictures`, `coupling_pictures` and `echo_pictures` of
+            `creeping.plotting`:
 
             - `ShadowLine`, `ShadowCurve`, `RayFan` (``plot_line``): ``kind="parameters"``, the plane of (theta, phi) in
               degrees, or ``kind="3d"``, which 3-D axes imply; ``curves=``, iso-phase curves to draw as well;

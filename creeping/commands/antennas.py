@@ -49,8 +49,6 @@ Size = Annotated[
 ]
 Folder = Annotated[Path, Parameter(name=["-o", "--output"], group=options.OUTPUT, help="Folder for the results.")]
 
-NEAR = 0.02
-"""Distance from the body, in its sizes, up to which a port is put on it."""
 MOST = 100_000
 """Pairs of ports times frequencies."""
 _VECTOR = r"([^,/=]+),([^,/=]+),([^,/=]+)"
@@ -175,7 +173,7 @@ def _waves(wavenumber: float | None, frequency: str | None, sound_speed: float |
     """Wavenumbers (n,), 1/L, and their frequencies, Hz, or None."""
     import numpy as np
 
-    from creeping.commands.wave import asked_wavenumber
+    from creeping.commands.forecast import asked_wavenumber
     from creeping.field.frequency import frequency as hertz_of
     from creeping.field.frequency import wavenumber as wavenumber_of
 
@@ -201,7 +199,8 @@ def _on_body(shape: Any, ports: Ports) -> tuple[Any, str]:
         raise InvalidInputError(rays_refused(shape))
     placed = project(shape, ports.points)
     off = np.linalg.norm(placed - ports.points, axis=1)
-    if bad := [name for name, far in zip(ports.names, off, strict=True) if not far <= NEAR * size(shape)]:
+    # a port is put on the body from a fiftieth of its size
+    if bad := [name for name, far in zip(ports.names, off, strict=True) if not far <= 0.02 * size(shape)]:
         raise InvalidInputError(
             f"--port {', '.join(bad)}: off the body by up to {np.nanmax(off):.3g} {unit_of(shape)}; give places on it"
         )
@@ -255,7 +254,7 @@ def _draw(path: Path, ports: Ports, found: Sequence[Any], hertz: Any, title: str
 
 def readable(ports: Ports, found: Sequence[Any], hertz: Any, summary: dict[str, Any], output: Path) -> str:
     """The summary in a few lines: each pair at the first and the last frequency."""
-    from creeping.commands.wave import frequency_words
+    from creeping.commands.forecast import frequency_words
 
     def wave(number: int) -> str:
         return f"k = {found[number].wavenumber:g}" if hertz is None else frequency_words(float(hertz[number]))

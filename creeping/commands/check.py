@@ -43,7 +43,7 @@ def check(
         raise InvalidInputError(f"--wavenumber {wavenumber!r} is not a positive finite number")
     asked: dict[str, Any] = {}
     if any(value is not None for value in (wavenumber, frequency, wavelength, sound_speed)):
-        from creeping.commands.wave import asked_wavenumber
+        from creeping.commands.forecast import asked_wavenumber
 
         wavenumber, hertz, cure = asked_wavenumber(wavenumber, frequency, wavelength, sound_speed)
         asked = {"metres": hertz is not None, "cure": cure}
@@ -157,7 +157,7 @@ def _mesh(
     if output is None:
         return
     from creeping.commands.resuming import make_folder
-    from creeping.plotting.mesh_picture import MeshValues, mesh_picture
+    from creeping.plotting.coloured_body import MeshValues, mesh_picture
 
     make_folder(output)
     shown = MeshValues(mesh.vertices, mesh.triangles, quality.badness, quality.bad, Path(body).name)

@@ -40,10 +40,6 @@ def ts(
 
 
 def _run(quantity: str, body: str, echo: options.EchoOptions, file: options.FileOptions, **wave: Any) -> int:
-    if echo.average:
-        from creeping.commands.averages import run_averages
+    from creeping.commands.echo_report import run_averages, run_echo
 
-        return run_averages(quantity, body, echo, file, **wave)
-    from creeping.commands.echo_report import run_echo
-
-    return run_echo(quantity, body, echo, file, **wave)
+    return (run_averages if echo.average else run_echo)(quantity, body, echo, file, **wave)

@@ -1,4 +1,4 @@
-"""What ``creeping rcs`` and ``creeping ts`` compute, write and say."""
+"""What ``creeping rcs`` and ``creeping ts`` compute, write and say: echoes, and means over all orientations."""
 
 import json
 import sys
@@ -21,10 +21,12 @@ from creeping.commands.options import EchoOptions, FileOptions
 from creeping.commands.resuming import SUMMARY, asked_for, begun, kept
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import parse_boundary
+from creeping.field.frequency import frequency
 from creeping.field.results.comparison import Comparison, compare
-from creeping.field.results.echo import Echo
+from creeping.field.results.echo import LEVELS, Echo
 from creeping.field.results.impulse import RangeProfile, range_profile
-from creeping.files import read_cut, write_echo, write_mat, write_profile
+from creeping.field.tmatrix.patterns import Averages
+from creeping.files import averaged_levels, read_cut, write_averages, write_echo, write_mat, write_profile
 from creeping.files.measured import MeasuredCut
 from creeping.geometry.checks import WRONG_SIGNS, wrong_signs
 from creeping.geometry.directions import directions_from_azimuth_elevation
@@ -33,6 +35,7 @@ from creeping.geometry.surface import Surface
 from creeping.shadow.status import FAILED, SINGULAR
 from creeping.sweeping.blocks import Rows
 from creeping.sweeping.echoes import backscatter, bistatic, echo_of, monostatic_method
+from creeping.sweeping.over_wavenumbers import averages_of, t_matrices
 
 
 def run_echo(quantity: str, body: str, given: EchoOptions, file: FileOptions, **wave: Any) -> int:
@@ -236,12 +239,11 @@ def _drawn(
     several, band = len(echo.azimuth) > 1, len(echo.wavenumbers) > 1
     jobs: dict[str, Callable[[Path], None]] = {}
     if several and band:
-        jobs[f"{stem}_map.png"] = lambda path: plotting.echo_map_picture(path, echo, **words)
-    elif several:
-        jobs[f"{stem}.png"] = lambda path: plotting.echo_cut_picture(path, echo, **words)
-        jobs[f"{stem}_polar.png"] = lambda path: plotting.echo_cut_picture(path, echo, kind="polar", **words)
-    elif band:
-        jobs[f"{stem}.png"] = lambda path: plotting.echo_band_picture(path, echo, **words)
+        jobs[f"{stem}_map.png"] = lambda path: plotting.echo_picture(path, echo, **words)
+    elif several or band:
+        jobs[f"{stem}.png"] = lambda path: plotting.echo_picture(path, echo, **words)
+    if several and not band:
+        jobs[f"{stem}_polar.png"] = lambda path: plotting.echo_picture(path, echo, kind="polar", **words)
     if profiles:
         jobs["range.png"] = lambda path: plotting.range_picture(path, profiles, echo, span, **words)
     names = []
@@ -336,3 +338,86 @@ def readable(summary: dict[str, Any], output: Path) -> str:
         rows.append(f"  {100 * off['within_error']:.0f} % within the stated error{shift}{wrapped}")
     rows.append(f"{summary['seconds']:.1f} s; results in {output}/: {', '.join(summary['files'])}")
     return "\n".join(rows)
+
+
+def run_averages(quantity: str, body: str, given: EchoOptions, file: FileOptions, **wave: Any) -> int:
+    """Compute, write and tell means over orientation; ``wave`` as of `run_echo`."""
+    started, output = time.perf_counter(), given.output or Path(quantity)
+    stray = [
+        f"--{name}"
+        for name in ("monostatic", "bistatic", "incidence", "compare", "column", "align")
+        if getattr(given, name)
+    ]
+    stray += ["--polarisation"] * bool(wave["polarisation"])
+    stray += ["--method"] * (given.method not in ("auto", "t-matrix"))
+    if stray:
+        raise InvalidInputError(f"--average is over all angles and polarisations: leave out {', '.join(stray)}")
+    each_once("--format", given.formats, ("csv",))
+    asked: dict[str, Any] = {"frequency": given.frequency, "wavelength": given.wavelength, **wave}
+    request = echo_request(quantity, monostatic=None, bistatic=None, incidence=None, **asked)
+    boundary, k = parse_boundary(request.boundary), request.wavenumbers
+    hertz = np.array([float(f"{one:.14g}") for one in np.atleast_1d(frequency(k, sound_speed=request.sound_speed))])
+    words = asked | {"average": True} | file.given() | {"pictures": given.pictures}
+    with Progress("frequencies", quiet=given.json_) as progress:
+        shape = parse_body(body, options=file, cache=given.cache, progress=progress)
+        told = forecast(shape, k, boundary, method="t-matrix", metres=True, cure=request.cure)
+        progress.note(f"{told.body}, {boundary_words(boundary)}")
+        unfinished = begun(output, quantity, asked_for(body, shape, **words), resume=given.resume)
+        if unfinished is None:
+            print((output / SUMMARY).read_text() if given.json_ else f"nothing is missing in {output}")
+            return 0
+        progress(f"the mean over all orientations at {len(k)} frequenc{'ies' if len(k) > 1 else 'y'} by {told.by}")
+        progress.begin(0, len(k))
+        table, rows = output / f"{quantity}_average.csv", list[tuple[float, Averages]]()
+
+        def write(mark: str = "") -> Any:
+            found = averages_of(shape, boundary, rows)
+            write_averages(table, quantity, hertz[: len(rows)], found, mark=mark)
+            return found
+
+        def incomplete() -> None:
+            write(f"incomplete: {len(rows)} of {len(k)} frequencies; {unfinished.mark}")
+            missing = {"values_done": len(rows), "values": len(k), "resume": unfinished.again}
+            unfinished.write_summary(missing | {"files": [table.name, SUMMARY]}, complete=False)
+
+        with kept(unfinished, progress.message):
+            for T in t_matrices(shape, wavenumbers=k, boundary=boundary, store=unfinished.parts):
+                rows.append((T.wavenumber, T.orientation_average()))
+                progress.told(len(rows), len(k))
+                if len(rows) < len(k):
+                    unfinished.now_and_then(incomplete)
+            found = write()
+            levels, error = averaged_levels(quantity, found), found.target_strength_error.values
+            names = [table.name]
+            if given.pictures and len(k) > 1:
+                title = f"{body if len(body) < 50 else f'{body[:47]}...'}, mean over all orientations"
+                picture = output / f"{quantity}_average.png"
+                plotting.averages_picture(picture, quantity, hertz, levels, error, title=title)
+                names.append(picture.name)
+            summary = {
+                "body": body,
+                "version": __version__,
+                "quantity": f"{quantity}, mean over orientation",
+                "unit": LEVELS[quantity][1],
+                "boundary": request.boundary,
+                "values": len(k),
+                "frequency_hz": [float(hertz[0]), float(hertz[-1])],
+                "range": [float(levels.min()), float(levels.max())],
+                "error_db": float(error.max()),
+                "files": [*names, SUMMARY],
+            }
+            unfinished.write_summary(summary, complete=True)
+    summary |= {"complete": True, "seconds": round(time.perf_counter() - started, 2)}
+    print(json.dumps(summary, indent=1) if given.json_ else _readable_averages(summary, output))
+    return 0
+
+
+def _readable_averages(summary: dict[str, Any], output: Path) -> str:
+    """The summary as a person reads it."""
+    low, high = summary["range"]
+    span = f"{low:.2f}" if low == high else f"{low:.2f} to {high:.2f}"
+    of = f"{summary['quantity']}, of {summary['body']}, {boundary_words(summary['boundary'])}"
+    return (
+        f"{of}: {span} {summary['unit']}, error {summary['error_db']:.1g} dB at most\n"
+        f"{summary['seconds']:.1f} s; results in {output}/: {', '.join(summary['files'])}"
+    )

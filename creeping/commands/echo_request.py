@@ -9,8 +9,7 @@ import numpy as np
 
 from creeping._typing import FloatArray
 from creeping.commands.body import each_once
-from creeping.commands.forecast import size_words
-from creeping.commands.wave import cure_of
+from creeping.commands.forecast import cure_of, size_words
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import boundary_name, parse_boundary
 from creeping.field.frequency import frequency as frequency_of

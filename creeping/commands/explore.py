@@ -78,9 +78,11 @@ def explore(
     asked: dict[str, Any] = {"length": steps * step, "n_steps": steps, "cache": cache, "progress": progress}
     flow = cr.choose_flow(shape, n_rays=moves * request.rays, tolerance=tolerance, **asked)
     if export is not None:
-        from creeping.explorer.export import export_page
+        from creeping.explorer.notebook import page_of
+        from creeping.files import write_text
 
-        found = export_page(export, flow, request, name=name)
+        text, found = page_of(flow, request, name)
+        write_text(export, text)
         megabytes, rms = export.stat().st_size / 1e6, found.fan.error.rms
         print(f"{export}  {megabytes:.1f} MB  {len(found.fan.points)} rays, rms {rms:.1e}")
         return 0

@@ -179,7 +179,6 @@ def run(
     import creeping as cr
     from creeping.commands import forecast as _forecast
     from creeping.commands import run_field as _field_run
-    from creeping.commands import run_plane as _plane_run
     from creeping.commands import run_report as _run_results
     from creeping.geometry.incident import PlaneWave, PointSource
     from creeping.geometry.parts import why_no_rays
@@ -202,7 +201,7 @@ def run(
     job = _field_run.job(wavenumber, boundary, observe, direction, **wave)
     with Progress(quiet=json_) as progress:
         shape = parse_body(body, speed, options=file, cache=cache, progress=progress)
-        planes = [_plane_run.parse_plane(text) for text in plane or ()]
+        planes = [_run_results.parse_plane(text) for text in plane or ()]
         if planes and job is None:
             raise cr.InvalidInputError("--plane needs --wavenumber or --frequency, which ask for the field")
         if job:
@@ -244,7 +243,7 @@ def run(
                 summary["field"]["seconds"] = field_seconds
                 summary["files"][-1:-1] = names
             if job and planes:
-                summary["planes"], names = _plane_run.write_planes(planes, job, fan, written, progress)
+                summary["planes"], names = _run_results.write_planes(planes, job, fan, written, progress)
                 summary["files"][-1:-1] = names
             summary["seconds"] = round(time.perf_counter() - started, 2)
             unfinished.write_summary(summary, complete=True)

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from creeping.storage.parts import Parts
 
 ASKED, SUMMARY = "asked.json", "summary.json"
-MOST = 10_000_000
-"""Bytes of a file of these that is read."""
 words: list[str] = []
 """Of the command line that is being run."""
 
@@ -151,7 +149,7 @@ def _read(path: Path) -> dict[str, Any] | None:
     from creeping.storage.reading import bytes_of
 
     with suppress(OSError, ValueError, RecursionError):
-        content = json.loads(bytes_of(path, MOST))
+        content = json.loads(bytes_of(path, 10_000_000))
         return content if isinstance(content, dict) else None
     return None
 

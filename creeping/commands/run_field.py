@@ -10,9 +10,8 @@ import numpy as np
 from creeping import files, plotting
 from creeping._typing import ArrayLike, FloatArray
 from creeping.commands.body import Output, each_once, write_tables
-from creeping.commands.forecast import Forecast, forecast, radar_of
+from creeping.commands.forecast import Forecast, asked_wavenumber, forecast, frequency_words, radar_of
 from creeping.commands.resuming import Unfinished
-from creeping.commands.wave import asked_wavenumber, frequency_words
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.body_currents import cached_currents
 from creeping.field.boundary import BoundaryLike, parse_boundary
@@ -31,12 +30,10 @@ from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan
 from creeping.storage.parts import Arrays
 
-ORDER = 2
 DPI = 200
 """Of pictures."""
 MOST = 200_000
 """Directions of one run."""
-FORMS = "cut:PHI, cut:PHI:STEP, grid:STEP, THETA,PHI or backscatter, in degrees"
 POLARISATIONS = {"VV": "tt", "VH": "tp", "HV": "pt", "HH": "pp"}
 """Received and transmitted, V along theta and H along phi, and the names of the components in pictures."""
 
@@ -115,11 +112,6 @@ class Job:
         """Wavenumber and boundary, as pictures ask for them."""
         return {"wavenumber": self.wavenumber, "boundary": self.boundary}
 
-    @property
-    def asked(self) -> dict[str, Any]:
-        """Wavenumber, boundary and order, as fields ask for them."""
-        return self.wave | {"order": ORDER}
-
     def told(self, unit: str) -> str:
         """Wavenumber and frequency in words."""
         wave = f"k = {self.wavenumber:g}/{unit}"
@@ -147,7 +139,7 @@ class Job:
             return found
 
         try:
-            far = far_in_parts(fan, self.directions, keep=keep, **self.asked)
+            far = far_in_parts(fan, self.directions, keep=keep, order=2, **self.wave)
         except BaseException:
             if there:
                 self._write_rows(FarField.joined(there), unfinished)
@@ -228,7 +220,7 @@ class Job:
     def _uncertainty(self, far: FarField, fan: RayFan) -> dict[str, Any]:
         """Rms and largest change on the second fit, or why there is none to tell."""
         try:
-            change = far_field_uncertainty(fan, far.directions, **self.asked)
+            change = far_field_uncertainty(fan, far.directions, **self.wave)
         except CreepingError as error:
             # the second fit may have a shadow line that cannot be followed
             return {"rms": None, "max": None, "reason": str(error)}
@@ -290,7 +282,7 @@ class Job:
             names.append("field.png")
         # at points between rays the field needs a smooth body
         elif isinstance(of, RayFan) and self.boundary != "pec" and not is_piecewise(of.body):
-            plotting.surface_field_picture(folder / "field.png", of, **self.asked, **shown)
+            plotting.surface_field_picture(folder / "field.png", of, **self.wave, **shown)
             names.append("field.png")
         return names
 
@@ -411,5 +403,8 @@ def _numbers(text: str, rest: str, count: int) -> list[float]:
     except ValueError:
         numbers = []
     if len(numbers) != count or not np.all(np.isfinite(numbers)):
-        raise InvalidInputError(f"--observe {text!r} is unknown; give {FORMS}")
+        raise InvalidInputError(
+            f"--observe {text!r} is unknown; give cut:PHI, cut:PHI:STEP, grid:STEP, THETA,PHI or backscatter, "
+            "in degrees"
+        )
     return numbers

@@ -1,8 +1,8 @@
-"""What one ``creeping run`` says and writes, of rays and of bodies without them. Part of the command line."""
+"""What one ``creeping run`` says and writes, of rays, of bodies without them and on planes."""
 
 import time
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,18 +12,122 @@ from creeping import files, plotting
 from creeping._progress import Progress
 from creeping._version import __version__
 from creeping.commands.body import Output, write_tables
-from creeping.commands.forecast import boundary_words
+from creeping.commands.forecast import boundary_words, frequency_words
 from creeping.commands.resuming import Unfinished, kept
 from creeping.commands.run_field import DPI, Job
-from creeping.commands.run_plane import Plane, plane_words, write_planes
-from creeping.commands.wave import frequency_words
 from creeping.errors import InvalidInputError
+from creeping.field.cut_result import FieldCut, cut_grid, field_cut
+from creeping.field.equation.solution import Solution
 from creeping.field.validity_range import Validity, validity_words
 from creeping.geometry.arguments import rays_refused
 from creeping.geometry.parts import why_no_rays
 from creeping.geometry.piecewise import is_piecewise
+from creeping.rays.fan import RayFan
 from creeping.rays.status import RayStatus
 from creeping.rays.uncertain_body import body_uncertainty
+
+PLANES = {"incidence": None, "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+
+
+@dataclass(frozen=True)
+class Plane:
+    """One ``--plane``: its text, the axes that span it (2, 3) or None, and the step if one is given, L."""
+
+    text: str
+    axes: Any
+    step: float | None
+
+
+def parse_plane(text: str) -> Plane:
+    """What one ``--plane`` asks for.
+
+    Raises
+    ------
+    InvalidInputError
+        If the text has none of the known forms.
+    """
+    name, colon, rest = text.partition(":")
+    step = None
+    if colon:
+        try:
+            step = float(rest)
+        except ValueError:
+            step = np.nan
+    if name not in PLANES or (step is not None and not (np.isfinite(step) and step > 0)):
+        raise InvalidInputError(
+            f"--plane {text!r} is unknown; give incidence, xy, xz or yz, with :STEP if it is not to fit "
+            "the wave, e.g. xz:0.02"
+        )
+    numbers = PLANES[name]
+    return Plane(text, None if numbers is None else np.eye(3)[list(numbers)], step)
+
+
+def write_planes(
+    planes: Sequence[Plane],
+    job: Job,
+    source: RayFan | Solution,
+    output: Output,
+    progress: Callable[[str], None],
+) -> tuple[list[dict[str, Any]], list[str]]:
+    """Compute fields on planes, by a fan or a solution, and write their files.
+
+    Returns entries of the summary and the names of the files.
+    """
+    entries, names = [], []
+    for number, plane in enumerate(planes, 1):
+        stem = "plane" if number == 1 else f"plane_{number}"
+        grid = cut_grid(source, **_options(plane, job, source))
+        progress(f"field on the plane {plane.text}: {len(grid.points)} points")
+        started = time.perf_counter()
+        cut = field_cut(source, **_options(plane, job, source), **_polarisation(job))
+        seconds = time.perf_counter() - started
+        if job.unit:
+            cut = replace(cut, field=replace(cut.field, length_unit=job.unit))
+        names += write_tables(output.folder / stem, output.formats, cut, cut=cut)
+        if output.pictures and np.any(cut.field.ok):
+            title = f"{output.name}\n{job.told(cut.field.length_unit)}, {cut.field.boundary}"
+            plotting.field_cut_picture(output.folder / f"{stem}.png", cut, error=True, title=title, dpi=DPI)
+            names.append(f"{stem}.png")
+        entries.append(_plane_entry(plane, cut) | {"seconds": round(seconds, 2)})
+    return entries, names
+
+
+def _options(plane: Plane, job: Job, source: RayFan | Solution) -> dict[str, Any]:
+    """Arguments of `field_cut`, and of `cut_grid`."""
+    axes = {} if plane.axes is None else {"across": plane.axes[0], "up": plane.axes[1]}
+    return (job.wave if isinstance(source, RayFan) else {}) | axes | {"step": plane.step}
+
+
+def _polarisation(job: Job) -> dict[str, Any]:
+    """Of a conductor the transmitted one of the first component that pictures show."""
+    return {"polarisation": {"t": "theta", "p": "phi"}[job.components[0][1]]} if job.boundary == "pec" else {}
+
+
+def _plane_entry(plane: Plane, cut: FieldCut) -> dict[str, Any]:
+    field = cut.field
+    methods, counts = np.unique(field.method, return_counts=True)
+    off = field.error[field.ok]
+    return {
+        "plane": plane.text,
+        "points": [len(cut.across), len(cut.up)],
+        "step": cut.step,
+        "inside": int(np.sum(~cut.outside)),
+        "status": field.status_counts,
+        "methods": {str(name): int(count) for name, count in zip(methods, counts, strict=True)},
+        "error_median": float(np.median(off)) if off.size else None,
+        "error_max": float(off.max()) if off.size else None,
+    }
+
+
+def plane_words(entry: dict[str, Any]) -> str:
+    """One line on a field on a plane."""
+    states = ", ".join(f"{count} {name}" for name, count in entry["status"].items())
+    error = "" if entry["error_max"] is None else f"; error {entry['error_median']:.1e} in the median, "
+    error += "" if entry["error_max"] is None else f"{entry['error_max']:.1e} at most"
+    return (
+        f"field on the plane {entry['plane']}: {' x '.join(map(str, entry['points']))} points {entry['step']:.3g} "
+        f"apart, {states}{error}; {entry['seconds']:.1f} s"
+    )
 
 
 def wave_entry(source: Any) -> dict[str, list[float]]:

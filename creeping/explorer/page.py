@@ -52,19 +52,13 @@ from creeping.geometry.surface import size
 from creeping.rays.transport import Flow
 
 HOST = "127.0.0.1"
-REST = 0.4
-"""Seconds for which the hand rests before work begins that would hold up its next move."""
 FOLLOWING = 4.0
 """Step of the far-field cut while the hand moves, degrees."""
-PACE = 0.25
-"""Seconds between two such cuts at least."""
 
 T = TypeVar("T")
 
 STEP = 30
 """Degrees between two pictures of a running wave."""
-PLAYING_PACE = 0.15
-"""Seconds between them at least; they take as long a rest as their making took."""
 
 
 class LocalServer(viser.ViserServer):  # type: ignore[misc]
@@ -306,7 +300,7 @@ class Explorer:
         """Let the far-field cut follow the frames, at a pace of its own: it takes longer than they do."""
         while (taken := self._cuts.take()) is not None:
             (frame, number), _ = taken
-            request, began, pace = frame.request, time.perf_counter(), PACE
+            request, began, pace = frame.request, time.perf_counter(), 0.25
             try:
                 angles = np.arange(-180.0, 180.0 + CUT_STEP / 2, CUT_STEP)
                 if (exact := matrix_cut(self.flow.body, request, angles)) is not None:
@@ -350,7 +344,8 @@ class Explorer:
             def stale(number: int = number) -> bool:
                 return self._requests.closed or self._requests.number != number
 
-            time.sleep(REST)
+            # the hand rests before work begins that would hold up its next move
+            time.sleep(0.4)
             try:
                 found = None if stale() else refined_view(self.flow, frame, self.model.mesh.vertices, stale)
                 if found is None:
@@ -487,7 +482,8 @@ class Player:
 
     def _run(self) -> None:
         took = 0.0
-        while self._playing.wait() and not self._closed.wait(max(PLAYING_PACE, took)):
+        # 0.15 s between two pictures at least, and as long a rest as their making took
+        while self._playing.wait() and not self._closed.wait(max(0.15, took)):
             if not self._playing.is_set():
                 continue
             began = time.perf_counter()

@@ -27,7 +27,7 @@ from creeping.field.equation.effort import SECONDS, plan_of
 from creeping.field.equation.solution import Solution
 from creeping.field.equation.solving import is_rough, solved_alone
 from creeping.field.near import MISSING, near_field
-from creeping.field.results.labelled import ArrayResult, directed
+from creeping.field.results.labelled import ArrayResult, Tabled, dataset, directed
 from creeping.field.results.point_result import FieldStatus, NearField, WithStatus
 from creeping.field.waves.surface import scalar_boundary
 from creeping.geodesics.bundle import as_points
@@ -36,10 +36,8 @@ from creeping.geometry.surface import Surface
 from creeping.rays.fan import launch
 from creeping.rays.transport import Flow
 from creeping.shadow.line import shadow_line
-from creeping.storage.memory import required
 
 if TYPE_CHECKING:
-    import pandas
     import xarray
 
 N_RAYS = 48
@@ -49,7 +47,7 @@ BY_RAYS = 0.2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SourcePattern(ArrayResult, WithStatus, Drawn):
+class SourcePattern(ArrayResult, WithStatus, Drawn, Tabled):
     """Far fields F of s point sources in m directions; usable as the array of its values.
 
     Attributes
@@ -99,11 +97,15 @@ class SourcePattern(ArrayResult, WithStatus, Drawn):
 
     def to_xarray(self) -> xarray.Dataset:
         """``xarray.Dataset`` of values, error and status, by direction and source."""
-        return pattern_dataset(self)
-
-    def to_dataframe(self) -> pandas.DataFrame:
-        """Contents of `to_xarray` as a ``pandas.DataFrame``, one row per direction and source."""
-        return self.to_xarray().drop_dims("axis").to_dataframe()
+        unit, dims = self.length_unit, ("direction", "source")
+        coordinates = directed(self.directions, self.wavenumber, unit)
+        coordinates |= {
+            f"source_{name}": (("source",), self.sources[:, i], {"units": unit}) for i, name in enumerate("xyz")
+        }
+        told = {"units": "1", "long_name": "far field over that of the source with no body"}
+        variables: dict[str, Any] = {"pattern": (dims, self.values, told), "error": (dims, self.error, {"units": "1"})}
+        variables |= {name: (dims, getattr(self, name)) for name in ("error_by", "status", "method")}
+        return dataset(variables, coordinates, boundary=self.boundary)
 
     def __repr__(self) -> str:
         states = ", ".join(f"{n} {name}" for name, n in self.status_counts.items())
@@ -214,23 +216,3 @@ def _received(
         return None
     fan = launch(flow, line, wavenumber=k, n_rays=n_rays, measured=False)
     return near_field(fan, points, wavenumber=k, boundary=boundary)
-
-
-def pattern_dataset(pattern: SourcePattern) -> xarray.Dataset:
-    """Far fields of sources with their error and status, by direction and source: see `SourcePattern.to_xarray`."""
-    library = required("xarray", use="labelled results need", extra="sweep")
-    unit, dims = pattern.length_unit, ("direction", "source")
-    coordinates = directed(pattern.directions, pattern.wavenumber, unit)
-    coordinates |= {
-        f"source_{name}": (("source",), pattern.sources[:, i], {"units": unit}) for i, name in enumerate("xyz")
-    }
-    told = {"units": "1", "long_name": "far field over that of the source with no body"}
-    variables: dict[str, Any] = {
-        "pattern": (dims, pattern.values, told),
-        "error": (dims, pattern.error, {"units": "1"}),
-    }
-    for name in ("error_by", "status", "method"):
-        variables[name] = (dims, getattr(pattern, name), {})
-    words = {"boundary": pattern.boundary, "conventions": "time factor exp(-i omega t)"}
-    found: xarray.Dataset = library.Dataset(variables, coordinates, words)
-    return found

@@ -1,7 +1,7 @@
 """Pictures of shadow lines, creeping rays, iso-phase curves and fields.
 
 Every name is imported on first use, so that importing this package costs neither matplotlib nor pyvista.
-``scene.plot_rays_3d`` draws with pyvista, ``axes3d.plot_rays_3d`` with matplotlib; ``picture`` chooses.
+``picture`` draws in space, with pyvista or matplotlib.
 """
 
 import lazy_loader

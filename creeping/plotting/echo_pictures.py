@@ -1,6 +1,7 @@
 """Pictures of an echo: against angle or frequency with the band of its error, as a map of both, and in range.
 
-Also here: pictures that responses to a pulse draw of themselves: level against delay or range.
+Also here: pictures that responses to a pulse draw of themselves, level against delay or range; and of a T-matrix: its
+backscatter in all directions, the size of its entries by degrees of the waves, and means over orientation.
 """
 
 import os
@@ -13,30 +14,37 @@ from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.frequency import suited
 from creeping.field.results.comparison import decibels, shown_range
+from creeping.field.results.echo import LEVELS
 from creeping.field.results.impulse import range_profile
+from creeping.field.tmatrix.patterns import degrees_of
+from creeping.geometry.directions import directions_from_azimuth_elevation
 from creeping.plotting import pages
-from creeping.plotting.far_cuts import Curve, band_words, draw_cut, heights_of
+from creeping.plotting.far_cuts import COMPONENTS, QUANTITIES, Curve, draw_curves, draw_cut, heights_of
 
 if TYPE_CHECKING:
     from creeping.field.results.comparison import Comparison
     from creeping.field.results.echo import Echo
     from creeping.field.results.impulse import ImpulseResponse, RangeProfile
+    from creeping.field.tmatrix.result import TMatrix
 
 SPAN = 60.0
 """Range of levels, dB."""
+SPANS = {"backscatter": 50.0, "waves": 120.0}
+"""Range of levels of each kind of picture of a T-matrix, dB."""
 
 
-def echo_cut_picture(
+def echo_picture(
     path: str | os.PathLike[str], echo: "Echo", *, kind: str = "cartesian", title: str = "", dpi: int = 200
 ) -> None:
-    """Write a PNG of an echo against its angle, one curve for each channel, at one wavenumber.
+    """Write a PNG of an echo as `plot_echo` draws it; of a map over angle and frequency a panel for each channel.
 
     Parameters
     ----------
     path : str or path
     echo : Echo
-        Of several angles; its first wavenumber is drawn.
+        Of several angles, several frequencies, or both.
     kind : {"cartesian", "polar"}
+        Of a cut.
     title : str
     dpi : int
 
@@ -45,60 +53,15 @@ def echo_cut_picture(
     CreepingError
         If nothing can be drawn, or the file cannot be written.
     """
-    with pages.written_figure(path, pages.PAGE if kind == "cartesian" else (6.4, 6.4), dpi) as figure:
-        ax = figure.add_subplot(projection="polar" if kind == "polar" else None)
-        draw_echo_cut(ax, echo)
-        pages.finished(ax, True, title)
-
-
-def draw_echo_cut(ax: Any, echo: "Echo", span: float = SPAN) -> None:
-    """Draw an echo of several angles at its first wavenumber, on straight or polar axes."""
-    curves = _curves(echo, (slice(None), 0))
-    heights = heights_of(curves, span)
-    curves = _told_if_low(curves, heights[0])
-    draw_cut(ax, np.radians(echo.angles), curves, heights, level=_level(echo), angle_name=echo.angle_name)
-
-
-def echo_band_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str = "", dpi: int = 200) -> None:
-    """Write a PNG of an echo against frequency at its first angle; arguments as of `echo_cut_picture`."""
-    with pages.written_figure(path, pages.PAGE, dpi) as figure:
-        ax = figure.add_subplot()
-        draw_echo_band(ax, echo)
-        pages.finished(ax, True, title)
-
-
-def draw_echo_band(ax: Any, echo: "Echo", span: float = SPAN) -> None:
-    """Draw an echo against frequency at its first angle."""
-    curves = _curves(echo, (0, slice(None)))
-    low, high = heights_of(curves, span)
-    name = band_words(curves, low, high)
-    curves = _told_if_low(curves, low)
-    scale, unit = suited(float(echo.hertz.max()))
-    x = echo.hertz / scale
-    for curve in reversed(curves):
-        floor = low - (high - low)
-        if curve.band is not None:
-            band = np.maximum(curve.band, floor)
-            ax.fill_between(x, *band, label=name, color=curve.style["color"], alpha=0.18, linewidth=0)
-            name = "_one entry is enough"
-        ax.plot(x, np.maximum(curve.levels, floor), label=curve.label, **curve.style)
-    doubtful = echo.unresolved[:, 0].any(axis=0)
-    if doubtful.any():
-        ax.plot(x[doubtful], np.full(doubtful.sum(), low), "|", color=pages.GREY, clip_on=False, label="unresolved")
-    ax.set_xlim(x[0], x[-1])
-    ax.set_ylim(low, high)
-    pages.dressed(ax, f"frequency ({unit})", _level(echo))
-
-
-def echo_map_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str = "", dpi: int = 200) -> None:
-    """Write a PNG of an echo over angle and frequency, a panel for each channel; arguments as of `echo_cut_picture`.
-
-    What is unresolved has a veil of white.
-    """
     from matplotlib.patches import Patch
 
-    count = len(echo.channels)
-    heights = shown_range([echo.levels()], SPAN)
+    if len(echo.azimuth) < 2 or len(echo.wavenumbers) < 2:
+        polar = kind == "polar"
+        with pages.written_figure(path, (6.4, 6.4) if polar else pages.PAGE, dpi) as figure:
+            ax = plot_echo(echo, figure.add_subplot(projection="polar" if polar else None))
+            pages.finished(ax, True, title)
+        return
+    count, heights = len(echo.channels), shown_range([echo.levels()], SPAN)
     with pages.written_figure(path, (6.4, 0.6 + 2.9 * count), dpi) as figure:
         for number, channel in enumerate(echo.channels):
             ax = figure.add_subplot(count, 1, number + 1)
@@ -109,22 +72,40 @@ def echo_map_picture(path: str | os.PathLike[str], echo: "Echo", *, title: str =
             figure.legend(handles=[patch], loc="outside lower center", frameon=False, fontsize=8)
 
 
+def draw_echo_cut(ax: Any, echo: "Echo", span: float = SPAN) -> None:
+    """Draw an echo of several angles at its first wavenumber, on straight or polar axes."""
+    curves = _curves(echo, (slice(None), 0))
+    heights = heights_of(curves, span)
+    curves = _told_if_low(curves, heights[0])
+    draw_cut(ax, np.radians(echo.angles), curves, heights, level=_level(echo), angle_name=echo.angle_name)
+
+
+def draw_echo_band(ax: Any, echo: "Echo", span: float = SPAN) -> None:
+    """Draw an echo against frequency at its first angle."""
+    curves = _curves(echo, (0, slice(None)))
+    low, high = heights_of(curves, span)
+    scale, unit = suited(float(echo.hertz.max()))
+    x = echo.hertz / scale
+    draw_curves(ax, x, _told_if_low(curves, low), (low, high))
+    doubtful = echo.unresolved[:, 0].any(axis=0)
+    if doubtful.any():
+        ax.plot(x[doubtful], np.full(doubtful.sum(), low), "|", color=pages.GREY, clip_on=False, label="unresolved")
+    ax.set_xlim(x[0], x[-1])
+    ax.set_ylim(low, high)
+    pages.dressed(ax, f"frequency ({unit})", _level(echo))
+
+
 def draw_echo_map(ax: Any, echo: "Echo", number: int, heights: tuple[float, float]) -> None:
     """Draw one channel of an echo over angle and frequency, what is unresolved veiled."""
     from matplotlib.colors import ListedColormap
 
-    levels, (low, high) = echo.levels()[number], heights
     scale, unit = suited(float(echo.hertz.max()))
     at = echo.angles, echo.hertz / scale
-    # nulls are low, what is not there stays white
-    grid = np.where(np.isneginf(levels), low, levels)
-    image = ax.pcolormesh(*at, grid.T, vmin=low, vmax=high, cmap="cividis", shading="nearest")
+    pages.dressed(ax, f"{echo.angle_name} (degrees)", f"frequency ({unit})")
+    _draw_map(ax, at, echo.levels()[number].T, heights, _level(echo))
     doubtful = echo.unresolved[number]
     veil = np.ma.masked_where(~doubtful, np.ones(doubtful.shape)).T
     ax.pcolormesh(*at, veil, cmap=ListedColormap(["white"]), alpha=0.7, shading="nearest")
-    pages.dressed(ax, f"{echo.angle_name} (degrees)", f"frequency ({unit})")
-    ax.grid(visible=False)
-    pages.add_bar(ax.figure, image, _level(echo), extend=pages.beyond(levels, low, high), fontsize=9, ax=ax)
 
 
 def plot_echo(
@@ -377,3 +358,114 @@ def _ends(values: FloatArray, start: float | None, end: float | None) -> tuple[f
             f"values reach from {values[0]:g} to {values[-1]:g}"
         )
     return low, high
+
+
+def plot_t_matrix(
+    T: "TMatrix", ax: Any = None, *, kind: str = "backscatter", component: str | None = None, span: float | None = None
+) -> Any:
+    """Draw the backscatter of all orientations as a map, or the size of the matrix by degrees.
+
+    Parameters
+    ----------
+    T : TMatrix
+    ax : matplotlib.axes.Axes, optional
+        By default those of a new figure.
+    kind : {"backscatter", "waves"}
+        "backscatter": target strength, for a conductor radar cross section, by azimuth and elevation of the source as
+        seen from the body. "waves": norm of the entries by degrees of the incoming and the outgoing wave, which falls
+        to the error where the order suffices.
+    component : {"tt", "tp", "pt", "pp"}, optional
+        Of a conductor: scattered by incident, t for θ̂ and p for φ̂. By default the mean over incident, and the sum over
+        scattered polarisations.
+    span : float, dB, optional
+        Range below the highest value, by default 50 dB for "backscatter" and 120 dB for "waves".
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InvalidInputError
+        On an unknown kind or component.
+    """
+    if kind not in SPANS:
+        raise InvalidInputError(f"kind {kind!r} is unknown; give {' or '.join(SPANS)}")
+    if component is not None and (component not in COMPONENTS or not T.vector):
+        known = f"give {', '.join(COMPONENTS)}" if T.vector else "a scalar field has none"
+        raise InvalidInputError(f"component {component!r} is unknown; {known}")
+    fresh, ax = pages.axes_or_new(ax, pages.PAGE)
+    span = SPANS[kind] if span is None else span
+    if kind == "backscatter":
+        _draw_backscatter(ax, T, component, span)
+    else:
+        _draw_waves(ax, T, span)
+    return pages.finished(ax, fresh, pages.wave_title(T, T.unit), legend=False)
+
+
+def averages_picture(
+    path: str | os.PathLike[str],
+    quantity: str,
+    hertz: FloatArray,
+    levels: FloatArray,
+    error: FloatArray,
+    *,
+    title: str = "",
+    dpi: int = 200,
+) -> None:
+    """Write a PNG of levels (k,), dB, averaged over orientation, with their errors (k,), dB, against frequencies, Hz.
+
+    Raises
+    ------
+    CreepingError
+        If nothing can be drawn, or the file cannot be written.
+    """
+    name, unit = LEVELS[quantity]
+    scale, hertz_name = suited(float(hertz.max()))
+    low, high = shown_range([levels - error, levels + error], SPANS["backscatter"], step=1.0)
+    with pages.written_figure(path, pages.PAGE, dpi) as figure:
+        ax = figure.add_subplot()
+        look = {"color": pages.COLOURS[0], "alpha": 0.18, "linewidth": 0}
+        ax.fill_between(hertz / scale, levels - error, levels + error, label="stated error", **look)
+        ax.plot(hertz / scale, levels, label="mean over orientation", **pages.curve_style(0))
+        ax.set(xlim=(hertz[0] / scale, hertz[-1] / scale), ylim=(low, high))
+        pages.dressed(ax, f"frequency ({hertz_name})", f"{name} ({unit})")
+        pages.finished(ax, True, title)
+
+
+def _draw_backscatter(ax: Any, T: "TMatrix", component: str | None, span: float) -> None:
+    # eight pixels from a null of |f(d, -d)|, of degree 2L in each angle, to the next
+    count = 8 * (2 * T.order + 1) // 2
+    elevation, azimuth = np.linspace(-90.0, 90.0, count + 1), np.linspace(-180.0, 180.0, 2 * count + 1)
+    both = np.meshgrid(np.radians(azimuth), np.radians(elevation))
+    f = T.backscatter(-directions_from_azimuth_elevation(*map(np.ravel, both))).total
+    if component is not None:
+        f = f[:, *COMPONENTS[component]]
+    elif T.vector:
+        f = np.sqrt(np.mean(np.sum(np.abs(f) ** 2, axis=1), axis=1))
+    name, levels_of = QUANTITIES["rcs" if T.vector else "amplitude"]
+    label = name % T.unit + f", {component or 'mean'}" * T.vector
+    pages.dressed(ax, "azimuth (degrees)", "elevation (degrees)")
+    levels = levels_of(f).reshape(both[0].shape)
+    _draw_map(ax, (azimuth, elevation), levels, shown_range([levels], span), label)
+    ax.set(xlim=(-180, 180), ylim=(-90, 90), xticks=np.arange(-180, 181, 60), yticks=np.arange(-90, 91, 30))
+
+
+def _draw_waves(ax: Any, T: "TMatrix", span: float) -> None:
+    deg, _ = degrees_of(T.order, vector=T.vector)
+    known, first = np.unique(deg, return_index=True)
+    squares = np.add.reduceat(np.add.reduceat(np.abs(T.matrix) ** 2, first, axis=0), first, axis=1)
+    pages.dressed(ax, "degree of the incoming wave", "degree of the outgoing wave")
+    levels = 0.5 * decibels(squares / squares.max())
+    _draw_map(ax, (known, known), levels, shown_range([levels], span), "norm of T by degrees (dB re largest)")
+    ax.set_aspect("equal")
+
+
+def _draw_map(ax: Any, at: tuple[Any, Any], levels: FloatArray, heights: tuple[float, float], label: str) -> None:
+    """Levels (m, n) in colours over places along the axes (n,) and (m,), with their bar."""
+    low, high = heights
+    # nulls are low, what is not there stays white
+    grid = np.where(np.isneginf(levels), low, levels)
+    image = ax.pcolormesh(*at, grid, vmin=low, vmax=high, cmap="cividis", shading="nearest", rasterized=True)
+    ax.grid(visible=False)
+    pages.add_bar(ax.figure, image, label, extend=pages.beyond(levels, low, high), fontsize=9, ax=ax)

@@ -180,18 +180,22 @@ def draw_cut(
     polar = ax.name == "polar"
     dress = _round_axes if polar else _straight_axes
     dress(ax, angle, (low, high), level, angle_name)
+    draw_curves(ax, angle if polar else np.degrees(angle), curves, (low, high))
+    _hatch(ax, angle, curves)
+
+
+def draw_curves(ax: Any, x: FloatArray, curves: Sequence[Curve], heights: tuple[float, float]) -> None:
+    """Draw curves over x (m,) with the bands of their errors, the first curve on top."""
+    low, high = heights
+    # lines that leave the axes through the floor are cut there; round a circle they would pass the centre
+    floor = low if ax.name == "polar" else low - (high - low)
     name = band_words(curves, low, high)
     for curve in reversed(curves):
-        # lines that leave the axes through the floor are cut there; round a circle they would pass the centre
-        levels = np.maximum(curve.levels, low if polar else low - (high - low))
-        across = angle if polar else np.degrees(angle)
         if curve.band is not None:
-            band = np.maximum(curve.band, low if polar else low - (high - low))
             look = {"color": curve.style["color"], "alpha": 0.18, "linewidth": 0, "zorder": 0.5}
-            ax.fill_between(across, *band, label=name, **look)
+            ax.fill_between(x, *np.maximum(curve.band, floor), label=name, **look)
             name = "_one entry is enough"
-        ax.plot(across, levels, label=curve.label, **curve.style)
-    _hatch(ax, angle, curves)
+        ax.plot(x, np.maximum(curve.levels, floor), label=curve.label, **curve.style)
 
 
 def _hatch(ax: Any, angle: FloatArray, curves: Sequence[Curve]) -> None:

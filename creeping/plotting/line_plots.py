@@ -16,9 +16,9 @@ from creeping.geometry.checks import unit_of
 from creeping.geometry.incident import incident_of_row
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.plotting import _strokes, pages
-from creeping.plotting._drawing import Drawing, View, compose, rays_caption
+from creeping.plotting._drawing import View, compose, rays_caption
 from creeping.plotting._strokes import LevelColours, RayLook, RayOptions
-from creeping.plotting.pictures import TITLE_SIZE, drawn_page
+from creeping.plotting.pictures import TITLE_SIZE, add_legends, draw, drawn_page
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve, split_at_seam
 from creeping.shadow.curve import ShadowCurve
@@ -77,18 +77,37 @@ def plot_line(
         If the kind is unknown or not that of the axes, or a view is given for the plane.
     """
     if _in_space(ax, kind):
+        drawing = compose(line, fan, curves, view=view, **shown)
         if ax is None:
-            return _page(compose(line, fan, curves, view=view, **shown), legend is not False)
-        from creeping.plotting.axes3d import plot_rays_3d
-
-        return plot_rays_3d(line, fan, curves, ax=ax, view=view, legend=bool(legend), **shown)
+            figure, bar = drawn_page(drawing, "matplotlib", dpi=150)
+            if legend is not False:
+                add_legends(figure, drawing, bar)
+            return figure.axes[0]
+        draw(ax, drawing)
+        if legend:
+            drawing.add_legend(ax.figure)
+            drawing.colours.add_bar(ax.figure, ax=ax, shrink=0.6, aspect=24, pad=0.02)
+        return ax
     if view is not None:
         raise InvalidInputError("a view is for kind='3d'; the plane of the parameters has none")
-    fresh, ax = pages.axes_or_new(ax, page_size(torus=is_torus(line)))
-    ax = plot_parameters(line, fan, curves, ax=ax, legend=fresh if legend is None else legend, **shown)
+    torus = is_torus(line)
+    fresh, ax = pages.axes_or_new(ax, page_size(torus=torus))
+    look = RayLook(**shown)
+    body, ends = line.body, _strokes.drawn_ends(fan, look.until, look.wavenumber, look.boundary)
+    if fan is not None:
+        # finer than in space: near a pole phi turns fast
+        for stroke in _strokes.ray_strokes(fan, look.rays, ends, spacing=0.005):
+            pieces = _in_plane(body, stroke.lines)
+            _add(ax, pieces, color=stroke.colour, linewidth=0.8 * stroke.width, alpha=stroke.alpha, label=stroke.label)
+    colours = draw_curves(ax, _strokes.drawn_curves(curves, fan, ends), fan, ends)
+    for status in STATUSES:
+        pieces = _in_plane(body, _strokes.line_pieces(line, status))
+        _add(ax, pieces, color=_strokes.STATUS_COLOURS[status], linewidth=1.8, label=f"shadow line, {status}", zorder=4)
+    frame(ax, torus=torus)
+    if fresh if legend is None else legend:
+        _add_legend(ax, colours)
     if fresh:
-        title = rays_caption(line, fan, RayLook(**shown))
-        ax.set_title(title, fontsize=TITLE_SIZE, loc="left", parse_math=False)
+        ax.set_title(rays_caption(line, fan, look), fontsize=TITLE_SIZE, loc="left", parse_math=False)
     return ax
 
 
@@ -190,16 +209,6 @@ def _in_space(ax: Any, kind: str | None) -> bool:
     return made_for == "3d"
 
 
-def _page(drawing: Drawing, legend: bool) -> Any:
-    """Axes of a new figure as `picture` writes it."""
-    figure, bar = drawn_page(drawing, "matplotlib", dpi=150)
-    if legend:
-        drawing.add_legend(figure)
-        if drawing.colours.high > drawing.colours.low:
-            drawing.colours.add_bar(figure, cax=figure.add_axes(bar))
-    return figure.axes[0]
-
-
 def parameter_picture(
     path: str | os.PathLike[str],
     line: ShadowLine,
@@ -210,7 +219,7 @@ def parameter_picture(
     dpi: int = 300,
     **shown: Unpack[RayOptions],
 ) -> None:
-    """Write a PNG of the same in the plane of the body's parameters; see `plot_parameters`.
+    """Write a PNG of the same in the plane of the body's parameters; see `plot_line`.
 
     Raises
     ------
@@ -218,64 +227,9 @@ def parameter_picture(
         If the file cannot be written.
     """
     with pages.written_figure(path, page_size(torus=is_torus(line)), dpi) as figure:
-        ax = plot_parameters(line, fan, curves, ax=figure.add_subplot(), **shown)
+        ax = plot_line(line, figure.add_subplot(), fan=fan, curves=curves, legend=True, **shown)
         title = rays_caption(line, fan, RayLook(**shown), name)
         ax.set_title(title, fontsize=TITLE_SIZE, loc="left", parse_math=False)
-
-
-def plot_parameters(
-    line: ShadowLine,
-    fan: RayFan | None = None,
-    curves: Sequence[IsoPhaseCurve] = (),
-    *,
-    ax: Any = None,
-    legend: bool = True,
-    **shown: Unpack[RayOptions],
-) -> Any:
-    """Draw the shadow line, creeping rays and iso-phase curves over (phi, theta) in degrees.
-
-    Parameters
-    ----------
-    line : ShadowLine
-    fan : RayFan, optional
-    curves : sequence of IsoPhaseCurve
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw on; by default those of a new figure.
-    rays : int
-        Rays drawn at most.
-    until : float, optional
-        Travel time up to which rays are drawn; by default until their waves have fallen by 30 dB, or they have crossed
-        their neighbours twice.
-    wavenumber : float, optional, 1/L
-        Of these waves; that at which k rho = 10 if not given.
-    boundary : "hard", "soft", "pec" or ImpedanceBoundary
-        Of these waves; on a hard body they fall most slowly.
-    legend : bool
-        Whether to add a legend and the colour bar of the levels.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-    """
-    if ax is None:
-        from matplotlib import pyplot
-
-        ax = pyplot.figure(figsize=page_size(torus=is_torus(line)), dpi=150, layout="constrained").add_subplot()
-    look = RayLook(**shown)
-    body, ends = line.body, _strokes.drawn_ends(fan, look.until, look.wavenumber, look.boundary)
-    if fan is not None:
-        # finer than in space: near a pole phi turns fast
-        for stroke in _strokes.ray_strokes(fan, look.rays, ends, spacing=0.005):
-            pieces = _in_plane(body, stroke.lines)
-            _add(ax, pieces, color=stroke.colour, linewidth=0.8 * stroke.width, alpha=stroke.alpha, label=stroke.label)
-    colours = draw_curves(ax, _strokes.drawn_curves(curves, fan, ends), fan, ends)
-    for status in STATUSES:
-        pieces = _in_plane(body, _strokes.line_pieces(line, status))
-        _add(ax, pieces, color=_strokes.STATUS_COLOURS[status], linewidth=1.8, label=f"shadow line, {status}", zorder=4)
-    frame(ax, torus=is_torus(line))
-    if legend:
-        _add_legend(ax, colours)
-    return ax
 
 
 def page_size(*, torus: bool) -> tuple[float, float]:

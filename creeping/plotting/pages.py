@@ -1,5 +1,8 @@
 """What all pictures share: pages and axes, their names, titles and legends, colours of curves and bars of colours.
 
+Pages are figures outside pyplot that notebooks show: no window, no global state, and their axes answer as pictures. A
+notebook asks the last value of a cell for ``_repr_png_``, whichever backend is on.
+
 Any two colours of curves differ by 12 or more (CIEDE2000), also as seen in deuteranopia and protanopia, and each stands
 on white with a contrast of 3 to 1; `tests/plotting/test_palette.py` holds them to it. Styles differ as well, for print
 without colour.
@@ -10,8 +13,13 @@ Sources: [MOF09] for the simulation.
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BytesIO
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d import Axes3D
 
 from creeping._typing import Any, FloatArray
 from creeping.storage.atomic import written_aside
@@ -33,19 +41,45 @@ GREY = "#5a6872"
 EXACT = "#111111"
 
 
-def new_figure(inches: tuple[float, float]) -> Any:
-    """Return a figure outside pyplot: no window, no global state, whatever the user's backend; notebooks show it."""
-    from creeping.plotting._inline import made
+class InlineFigure(Figure):
+    """A figure that shows itself."""
 
-    return made(inches)
+    def _repr_png_(self) -> bytes:
+        """The figure as a PNG."""
+        with BytesIO() as stream:
+            self.savefig(stream, format="png", dpi=self.dpi)
+            return stream.getvalue()
+
+
+class _Inline:
+    """Axes that show the figure that they are in."""
+
+    figure: Any
+
+    def _repr_png_(self) -> bytes:
+        """The whole figure as a PNG."""
+        return bytes(self.figure._repr_png_())
+
+
+class InlineAxes(_Inline, Axes):
+    """Axes of the plane."""
+
+
+class InlineAxes3D(_Inline, Axes3D):  # type: ignore[misc, unused-ignore]
+    """Axes of space."""
+
+
+def new_figure(inches: tuple[float, float]) -> InlineFigure:
+    """Return a white figure outside pyplot, with a canvas of its own."""
+    figure = InlineFigure(figsize=inches, facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
 
 
 def axes_or_new(ax: Any, inches: tuple[float, float], *, space: bool = False) -> tuple[bool, Any]:
     """Whether the axes are new, and the axes: those given, or those of a new figure, of the plane or of space."""
     if ax is not None:
         return False, ax
-    from creeping.plotting._inline import InlineAxes, InlineAxes3D
-
     figure = new_figure(inches)
     figure.set_layout_engine("constrained")
     return True, figure.add_subplot(axes_class=InlineAxes3D if space else InlineAxes)

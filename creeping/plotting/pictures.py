@@ -1,4 +1,10 @@
-"""Whole figures as PNG files: the body in space, by pyvista or matplotlib, and the parameter plane."""
+"""Whole figures of the body in space as PNG files, by pyvista or matplotlib.
+
+Also here: the picture with matplotlib, for axes that are given and where OpenGL is missing. Hidden lines are found by
+looking, not by a depth buffer: mplot3d sorts whole artists, not points. So the body is drawn first, and of each curve
+the visible part over it and the hidden part faintly; that holds for the view it was drawn for, not after turning the
+axes.
+"""
 
 import os
 from collections.abc import Sequence
@@ -6,12 +12,11 @@ from typing import Unpack
 
 import numpy as np
 
-from creeping._typing import Any
+from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.plotting import axes3d
 from creeping.plotting._drawing import Drawing, View, compose
-from creeping.plotting._strokes import ARROW_COLOUR, RayOptions
-from creeping.plotting.pages import new_figure, save_figure
+from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, RayOptions, Stroke, runs
+from creeping.plotting.pages import InlineAxes3D, new_figure, save_figure
 from creeping.plotting.scene import gl_available, render
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
@@ -79,11 +84,16 @@ def picture(
     backend = chosen_backend(backend)
     drawing = compose(line, fan, curves, view=view, name=name, **shown)
     figure, bar = drawn_page(drawing, backend, dpi)
+    add_legends(figure, drawing, bar)
+    save_figure(figure, path, dpi)
+    return backend
+
+
+def add_legends(figure: Any, drawing: Drawing, bar: Place) -> None:
+    """Legend of a page, and the colour bar of its levels at the place for it."""
     drawing.add_legend(figure)
     if drawing.colours.high > drawing.colours.low:
         drawing.colours.add_bar(figure, cax=figure.add_axes(bar))
-    save_figure(figure, path, dpi)
-    return backend
 
 
 def chosen_backend(backend: str) -> str:
@@ -107,9 +117,7 @@ def drawn_page(drawing: Drawing, backend: str, dpi: int) -> tuple[Any, Place]:
     if backend == "pyvista":
         _draw_pyvista(figure, place, drawing, dpi)
     else:
-        from creeping.plotting._inline import InlineAxes3D
-
-        axes3d.draw(figure.add_axes(place, axes_class=InlineAxes3D), drawing)
+        draw(figure.add_axes(place, axes_class=InlineAxes3D), drawing)
     figure.text(0.02, 0.99, drawing.title, fontsize=TITLE_SIZE, va="top", parse_math=False)
     left, bottom, width, height = place
     return figure, (left + width + 0.02, bottom + 0.12 * height, 0.022, 0.76 * height)
@@ -145,3 +153,108 @@ def _draw_pyvista(figure: Any, place: Place, drawing: Drawing, dpi: int) -> None
     for mark in drawing.marks:
         ax.fill(*drawing.view.project(mark.outline(drawing.view)).T, color=ARROW_COLOUR, linewidth=0)
         ax.text(*drawing.view.project(mark.label(drawing.view)), mark.name, **mark.text)
+
+
+def draw(ax: Any, drawing: Drawing) -> None:
+    """Draw a composed picture on 3-D axes, without legend."""
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    # the order of drawing is ours: the body, hidden lines, visible lines by rank, arrows
+    ax.computed_zorder = False
+    _draw_body(ax, drawing)
+    for stroke in drawing.strokes:
+        _draw_stroke(ax, drawing, stroke)
+    # not quiver: its heads are flat in space and vanish when seen from the side
+    outlines = [mark.outline(drawing.view) for mark in drawing.marks]
+    ax.add_collection3d(Poly3DCollection(outlines, facecolors=ARROW_COLOUR, linewidths=0, zorder=30))
+    for mark in drawing.marks:
+        ax.text(*mark.label(drawing.view), mark.name, zorder=30, **mark.text)
+    # 3-D axes are square; a wide body may use all of the place they were given
+    for artist in ax.collections:
+        artist.set_clip_on(False)
+    _frame(ax, drawing)
+
+
+def _draw_body(ax: Any, drawing: Drawing) -> None:
+    """Draw the triangles that face the camera, lit from it; the others are behind them."""
+    from matplotlib.colors import to_rgb
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    corners = drawing.mesh.vertices[drawing.mesh.triangles]
+    middle = drawing.normals[drawing.mesh.triangles].mean(axis=1)
+    facing = middle @ drawing.view.toward / np.linalg.norm(middle, axis=1)
+    front = facing > -0.05
+    if drawing.paint is None:
+        shade = brightness(facing[front])[:, None] * np.array(to_rgb(BODY_COLOUR))
+    else:
+        # little shade: colours are read off a bar
+        paint = drawing.paint[drawing.mesh.triangles[front]].mean(axis=1)
+        shade = (0.55 + 0.45 * brightness(facing[front]))[:, None] * paint
+    # edges in the colour of the face close the hairlines between triangles
+    ax.add_collection3d(Poly3DCollection(corners[front], facecolors=shade, edgecolors=shade, linewidths=0.3, zorder=1))
+
+
+def brightness(facing: FloatArray) -> FloatArray:
+    """Brightness of a surface lit from the camera, by n.toward: dark at the rim, so that the outline shows on white."""
+    return np.asarray(0.62 + 0.38 * np.clip(facing, 0, 1))
+
+
+def _draw_stroke(ax: Any, drawing: Drawing, stroke: Stroke) -> None:
+    from mpl_toolkits.mplot3d.art3d import Line3DCollection
+
+    # one call for all lines: the march to the camera is vectorised over points
+    lengths = np.cumsum([len(points) for points in stroke.lines])[:-1]
+    seen = np.split(drawing.view.visible(drawing.body, np.concatenate(stroke.lines)), lengths)
+    visible = [piece for points, mask in zip(stroke.lines, seen, strict=True) for piece in runs(points, mask)]
+    # a segment is hidden if either of its ends is, so the hidden runs reach one point into the visible ones
+    hidden = [
+        piece
+        for points, mask in zip(stroke.lines, seen, strict=True)
+        for piece in runs(points, ~mask | np.append(~mask[1:], False) | np.append(False, ~mask[:-1]))
+    ]
+    for pieces, share, above in ((hidden, HIDDEN if stroke.through else 0.0, 0), (visible, 1.0, 10)):
+        if pieces and share > 0:
+            lines = Line3DCollection(
+                pieces,
+                colors=stroke.colour,
+                linewidths=stroke.width,
+                alpha=stroke.alpha * share,
+                capstyle="butt",
+                joinstyle="round",
+                zorder=2 + stroke.rank + above,
+            )
+            ax.add_collection3d(lines)
+
+
+def _frame(ax: Any, drawing: Drawing) -> None:
+    """Equal aspect, no axes, everything in the picture and nothing wasted."""
+    low, high = drawing.frame
+    half = 0.5 * float(np.max(high - low))
+    ax.set_axis_off()
+    ax.set_proj_type("ortho")
+    ax.view_init(elev=np.degrees(drawing.view.elevation), azim=np.degrees(drawing.view.azimuth))
+    _limits(ax, drawing.centre, half)
+    ax.set_box_aspect((1, 1, 1), zoom=1.0)
+    # mplot3d does not say how large it draws nor where: measure, correct the size, measure, correct the place
+    place = ax.get_position(original=True).transformed(ax.figure.transSubfigure)
+    _, unit = _measure(ax, drawing)
+    ax.set_box_aspect((1, 1, 1), zoom=float(np.min(np.array([place.width, place.height]) / (unit * (high - low)))))
+    centre, unit = _measure(ax, drawing)
+    off = (centre - 0.5 * (place.min + place.max)) / unit
+    _limits(ax, drawing.centre + off[0] * drawing.view.right + off[1] * drawing.view.up, half)
+
+
+def _limits(ax: Any, centre: FloatArray, half: float) -> None:
+    for axis, value in zip("xyz", centre, strict=True):
+        getattr(ax, f"set_{axis}lim")(value - half, value + half)
+
+
+def _measure(ax: Any, drawing: Drawing) -> tuple[FloatArray, FloatArray]:
+    """Where the centre of the picture lies (2,), pixels, and how many pixels one L takes, across and up (2,)."""
+    from mpl_toolkits.mplot3d.proj3d import proj_transform
+
+    ax.apply_aspect()
+    centre, view = drawing.centre, drawing.view
+    ends = np.stack([centre, centre + view.right, centre + view.up])
+    pixels = ax.transData.transform(np.stack(proj_transform(*ends.T, ax.get_proj())[:2], axis=-1))
+    return pixels[0], np.linalg.norm(pixels[1:] - pixels[0], axis=-1)

@@ -18,18 +18,14 @@ from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from creeping._typing import Any, FloatArray
 from creeping.errors import CreepingError
-from creeping.plotting._drawing import Drawing, View, compose
-from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, RayOptions, Stroke
-from creeping.rays.fan import RayFan
-from creeping.rays.isophase import IsoPhaseCurve
-from creeping.shadow.line import ShadowLine
+from creeping.plotting._drawing import Drawing
+from creeping.plotting._strokes import BODY_COLOUR, HIDDEN, Stroke
 from creeping.storage.reading import bytes_of
 
 REMEDY = "on Debian or Ubuntu install libegl1 libgl1-mesa-dri libx11-6"
@@ -44,61 +40,6 @@ raise SystemExit(0 if image.max() > image.min() else 3)
 """
 
 
-def plot_rays_3d(
-    line: ShadowLine,
-    fan: RayFan | None = None,
-    curves: Sequence[IsoPhaseCurve] = (),
-    *,
-    plotter: Any = None,
-    view: View | None = None,
-    legend: bool = True,
-    **shown: Unpack[RayOptions],
-) -> Any:
-    """Draw the body, its shadow line, creeping rays and iso-phase curves with pyvista.
-
-    Parameters
-    ----------
-    line : ShadowLine
-    fan : RayFan, optional
-    curves : sequence of IsoPhaseCurve
-    plotter : pyvista.Plotter, optional
-        Plotter to draw on; by default a new one.
-    view : View, optional
-        Camera; by default on the shadow side.
-    rays : int
-        Rays drawn at most.
-    until : float, optional
-        Travel time up to which rays are drawn; by default until their waves have fallen by 30 dB, or they have crossed
-        their neighbours twice.
-    wavenumber : float, optional, 1/L
-        Of these waves; that at which k rho = 10 if not given.
-    boundary : "hard", "soft", "pec" or ImpedanceBoundary
-        Of these waves; on a hard body they fall most slowly.
-    legend : bool
-        Whether to add a legend, the colour bar of the levels and the axes.
-
-    Returns
-    -------
-    pyvista.Plotter
-
-    Raises
-    ------
-    CreepingError
-        If there is no OpenGL on this machine.
-    """
-    require_gl()
-    import pyvista
-
-    drawing = compose(line, fan, curves, view=view, **shown)
-    if plotter is None:
-        plotter = pyvista.Plotter(window_size=(1200, 1000))
-    draw(plotter, drawing)
-    _add_incidence(plotter, drawing)
-    if legend:
-        _add_legend(plotter, drawing)
-    return plotter
-
-
 def require_gl() -> None:
     """Raise a CreepingError with the remedy where pyvista cannot draw; to be called before pyvista is imported."""
     probe = gl_available()
@@ -109,17 +50,10 @@ def require_gl() -> None:
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
 
-def draw(plotter: Any, drawing: Drawing, *, scale: float = 2.0) -> None:
-    """Draw a composed picture without arrow and legend; ``scale`` is the number of pixels per point of line width."""
-    plotter.set_background("white")
-    _add_body(plotter, drawing)
-    for number, stroke in enumerate(drawing.strokes):
-        _add_stroke(plotter, stroke, scale, f"stroke {number}")
-    _aim(plotter, drawing)
-
-
 def render(drawing: Drawing, pixels: tuple[int, int], *, scale: float) -> NDArray[np.float32]:
-    """Image (height, width, 3) in 0..1 in which lines behind the body keep a share of their ink.
+    """Image (height, width, 3) in 0..1, without arrows, in which lines behind the body keep a share of their ink.
+
+    ``scale`` is the number of pixels per point of line width.
 
     Two renderings, with the body and without it, multiplied like inks: a translucent body would need its layers
     sorted, which software renderers do badly, and would mix its own far side in.
@@ -129,7 +63,11 @@ def render(drawing: Drawing, pixels: tuple[int, int], *, scale: float) -> NDArra
 
     plotter = pyvista.Plotter(off_screen=True, window_size=pixels)
     try:
-        draw(plotter, drawing, scale=scale)
+        plotter.set_background("white")
+        _add_body(plotter, drawing)
+        for number, stroke in enumerate(drawing.strokes):
+            _add_stroke(plotter, stroke, scale, f"stroke {number}")
+        _aim(plotter, drawing)
         with_body = _image(plotter)
         plotter.actors["body"].visibility = False
         for number, stroke in enumerate(drawing.strokes):
@@ -194,23 +132,6 @@ def polylines(lines: Sequence[FloatArray]) -> Any:
     return pyvista.PolyData(np.concatenate(lines), lines=np.concatenate(cells))
 
 
-def _add_incidence(plotter: Any, drawing: Drawing) -> None:
-    import pyvista
-
-    tail, head = drawing.incidence.foot, drawing.incidence.tip
-    shape = pyvista.Arrow(
-        start=tail,
-        direction=head - tail,
-        scale=float(np.linalg.norm(head - tail)),
-        tip_length=0.25,
-        tip_radius=0.05,
-        shaft_radius=0.011,
-        tip_resolution=48,
-        shaft_resolution=24,
-    )
-    plotter.add_mesh(shape, color=ARROW_COLOUR, lighting=False, name="incidence")
-
-
 def _aim(plotter: Any, drawing: Drawing) -> None:
     """Parallel projection, everything in the picture."""
     low, high = drawing.frame
@@ -223,24 +144,6 @@ def _aim(plotter: Any, drawing: Drawing) -> None:
     camera.parallel_projection = True
     camera.parallel_scale = max(half[1], half[0] * height / width)
     plotter.renderer.reset_camera_clipping_range()
-
-
-def _add_legend(plotter: Any, drawing: Drawing) -> None:
-    import pyvista
-
-    entries = [(stroke.label, stroke.colour) for stroke in reversed(drawing.strokes) if stroke.label]
-    # not add_legend: its box does not grow with the text, which is then cut off at the window's edge
-    for k, (label, colour) in enumerate(entries):
-        place = (16, plotter.window_size[1] - 28 * (k + 1))
-        plotter.add_text(f"- {label}", position=place, font_size=9, color=colour, name=f"legend {k}")
-    plotter.add_text(drawing.title, position="lower_left", font_size=7, color="black", name="title")
-    plotter.add_axes(line_width=3)
-    colours = drawing.colours
-    if colours.high > colours.low:
-        mapper = pyvista.DataSetMapper()
-        mapper.lookup_table = pyvista.LookupTable(colours.mappable.cmap, scalar_range=(colours.low, colours.high))
-        bar = {"vertical": True, "position_x": 0.88, "position_y": 0.3, "width": 0.06, "height": 0.4}
-        plotter.add_scalar_bar(mapper=mapper, title=colours.name, n_labels=5, color="black", **bar)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.geometry.evaluators import polar_frame
 from creeping.geometry.piecewise import drawn_mesh
 from creeping.geometry.surface import Surface, size
-from creeping.plotting import axes3d, plot_parameters
+from creeping.plotting import pictures, plot_line
 from creeping.plotting._drawing import Drawing, Mark, View, compose
 from creeping.plotting._strokes import ARROW_COLOUR, RAY_COLOUR, LevelColours, Stroke, closed, refined
 
@@ -64,9 +64,9 @@ def draw_curves(
 
     scene = Scene(body, np.zeros(3), view, *drawn_mesh(body, 80), list(strokes), LevelColours.of([]))
     ax.computed_zorder = False
-    axes3d._draw_body(ax, scene)
+    pictures._draw_body(ax, scene)
     for stroke in scene.strokes:
-        axes3d._draw_stroke(ax, scene, stroke)
+        pictures._draw_stroke(ax, scene, stroke)
     ax.add_collection3d(
         Poly3DCollection([mark.outline(view) for mark in scene.triad], facecolors=ARROW_COLOUR, linewidths=0, zorder=30)
     )
@@ -77,7 +77,7 @@ def draw_curves(
     # 3-D axes are square; a wide body may use all of the place they were given
     for artist in ax.collections:
         artist.set_clip_on(False)
-    axes3d._frame(ax, scene)
+    pictures._frame(ax, scene)
 
 
 def directions_at(body: Surface, point: FloatArray, angles: FloatArray) -> FloatArray:
@@ -132,13 +132,13 @@ def panel(figure: Any, letter: str, text: str, place: tuple[float, float]) -> No
 def on_body(ax: Any, fan: cr.RayFan, curves: Sequence[cr.IsoPhaseCurve], until: float | None = np.inf) -> Drawing:
     """Draw shadow line, rays and iso-phase curves on 3-D axes; ``until`` as of `creeping.plotting.picture`."""
     drawing = compose(fan.line, fan, curves, rays=RAY_COUNT, until=until)
-    axes3d.draw(ax, drawing)
+    pictures.draw(ax, drawing)
     return drawing
 
 
 def in_parameters(ax: Any, fan: cr.RayFan, curves: Sequence[cr.IsoPhaseCurve], until: float | None = np.inf) -> None:
     """Draw the same over the parameters, degrees, without legend."""
-    plot_parameters(fan.line, fan, curves, ax=ax, rays=RAY_COUNT, until=until, legend=False)
+    plot_line(fan.line, ax, fan=fan, curves=curves, rays=RAY_COUNT, until=until, legend=False)
 
 
 def add_legend(figure: Any, drawings: Sequence[Drawing]) -> None:

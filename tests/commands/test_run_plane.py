@@ -7,8 +7,7 @@ import pytest
 import scipy.io
 from command_line import ran, table
 
-from creeping.commands import run_plane
-from creeping.commands.run_plane import parse_plane
+from creeping.commands.run_report import parse_plane
 from creeping.errors import InvalidInputError
 from tests.reference import sphere
 
@@ -34,25 +33,6 @@ def test_planes_are_written(tmp_path, capsys):
     away = np.linalg.norm(points, axis=1) > 1.4
     exact = sphere.total_field(12.0, 1.0, points[away], (0, 0, 1), "hard")
     assert np.median(np.abs(values[away] - exact)) < 0.03
-
-
-@pytest.mark.parametrize(("first", "each"), [(60.0, 1e-3), (0.0, 0.02)])
-def test_seconds_are_those_of_all_points_without_what_is_made_once(monkeypatch, first, each):
-    """By a clock of our own: kernels and currents take their time once, points each time."""
-    clock, asked = [0.0], []
-
-    def compute(points):
-        clock[0] += (0.0 if asked else first) + each * len(points)
-        asked.append(points)
-
-    monkeypatch.setattr(run_plane, "perf_counter", lambda: clock[0])
-    points = np.arange(30_000.0).reshape(-1, 3)
-    assert run_plane.expected_seconds(compute, points, 625) == pytest.approx(10_000 * each)
-    # each is one of them, none is taken twice, and they are spread over all
-    assert [len(some) for some in asked] == [312, 313]
-    some = np.concatenate(asked)[:, 0]
-    assert len(np.unique(some)) == 625 and np.all(np.isin(some, points[:, 0]))
-    assert np.all(np.histogram(asked[1][:, 0], bins=8, range=(0, 30_000))[0] > 15)
 
 
 def test_tables_for_matlab_hold_what_the_others_hold(tmp_path, capsys):

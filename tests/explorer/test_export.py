@@ -16,9 +16,11 @@ REQUEST = ViewRequest(theta=50.0, phi=40.0, rays=16, length=1.0, spacing=0.25, w
 
 
 def written(path, body=BODY, request=REQUEST):
-    from creeping.explorer.export import export_page
+    from creeping.explorer.notebook import Page, page_of
 
-    return export_page(path, cr.DirectFlow(body, rtol=1e-9), request)
+    text, found = page_of(cr.DirectFlow(body, rtol=1e-9), request, repr(body))
+    Page(text, "").save(path)
+    return found
 
 
 def test_the_page_holds_its_numbers_and_loads_nothing(tmp_path, coarse):
@@ -36,7 +38,7 @@ def test_the_page_holds_its_numbers_and_loads_nothing(tmp_path, coarse):
 def test_trouble_writes_nothing(tmp_path, monkeypatch):
     with pytest.raises(cr.SingularIncidenceError):
         written(tmp_path / "page.html", sc.Torus(), REQUEST.changed(theta=90.0, phi=0.0))
-    monkeypatch.setattr("creeping.explorer.export.page_of", lambda *_: ("page", None))
+    monkeypatch.setattr("creeping.explorer.notebook.page_of", lambda *_: ("page", None))
     with pytest.raises(cr.CreepingError):
         written(tmp_path / "no" / "such" / "folder" / "page.html")
     assert list(tmp_path.iterdir()) == []

@@ -113,7 +113,7 @@ def test_they_show_themselves_in_three_lines_and_pickle(fields):
         assert all(f"{count} {name}" in lines[1] for name, count in u.status_counts.items())
         again = pickle.loads(pickle.dumps(u))
         assert repr(again) == repr(u)
-        assert f">{type(u).__name__}</caption>" in u._repr_html_()
+        assert f"<pre>{type(u).__name__}(" in u._repr_html_()
 
 
 def test_every_status_has_a_remedy():

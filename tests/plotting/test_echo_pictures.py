@@ -39,7 +39,7 @@ def several(echo):
 
 
 def test_of_equal_curves_the_broken_one_lies_on_top(drawn):
-    echo_pictures.echo_cut_picture("a.png", two_channels(1.0))
+    echo_pictures.echo_picture("a.png", two_channels(1.0))
     (figure,) = drawn
     lines = {line.get_label(): line for line in figure.axes[0].lines}
     assert lines["VV"].get_zorder() > lines["HH"].get_zorder() and lines["VV"].get_linestyle() != "-"
@@ -50,9 +50,11 @@ def test_of_equal_curves_the_broken_one_lies_on_top(drawn):
 def test_a_curve_below_the_picture_is_told_in_the_legend(drawn, over):
     echo = two_channels(1e-6)
     if over == "frequency":
-        echo_pictures.echo_band_picture("a.png", several(echo))
-    else:
-        echo_pictures.echo_cut_picture("a.png", echo)
+        one = several(echo)
+        flags = {name: getattr(one, name)[:, :1] for name in ("total", "error", "unresolved", "by_currents")}
+        parts = {name: values[:, :1] for name, values in one.parts.items()}
+        echo = replace(one, azimuth=one.azimuth[:1], elevation=one.elevation[:1], parts=parts, **flags)
+    echo_pictures.echo_picture("a.png", echo)
     first, second, band = (text.get_text() for text in drawn[0].legends[0].get_texts())
     low = drawn[0].axes[0].get_ylim()[0]
     assert first == "HH" and second == f"VV, below {minus(low)} dB"
@@ -61,10 +63,10 @@ def test_a_curve_below_the_picture_is_told_in_the_legend(drawn, over):
 
 def test_of_a_map_what_is_unresolved_has_a_veil(drawn):
     echo = several(two_channels(0.5))
-    echo_pictures.echo_map_picture("a.png", echo)
+    echo_pictures.echo_picture("a.png", echo)
     unresolved = echo.unresolved.copy()
     unresolved[1, 0, 1] = True
-    echo_pictures.echo_map_picture("a.png", replace(echo, unresolved=unresolved))
+    echo_pictures.echo_picture("a.png", replace(echo, unresolved=unresolved))
     clear, veiled = drawn
     assert not clear.legends and veiled.legends[0].get_texts()[0].get_text() == "veiled: unresolved"
     shown = [int(np.ma.count(ax.collections[1].get_array())) for ax in veiled.axes if ax.get_title()]
@@ -72,7 +74,7 @@ def test_of_a_map_what_is_unresolved_has_a_veil(drawn):
 
 
 def test_rings_are_numbered_over_the_curves(drawn):
-    echo_pictures.echo_cut_picture("a.png", two_channels(1.0), kind="polar")
+    echo_pictures.echo_picture("a.png", two_channels(1.0), kind="polar")
     (ax,) = drawn[0].axes
     rings = [text for text in ax.texts if text.get_gid() == "ring"]
     assert rings and all(text.get_zorder() > line.get_zorder() for text in rings for line in ax.lines)

@@ -64,4 +64,4 @@ def test_it_goes_on_given_axes_and_refuses_what_it_does_not_know(T):
 
 def test_its_table_has_what_it_scatters(T):
     table = T._repr_html_()
-    assert all(word in table for word in ("Ellipsoid", "mean backscattering", "unitarity", T.boundary))
+    assert all(word in table for word in ("Ellipsoid", "reciprocity", "unitarity", T.boundary))

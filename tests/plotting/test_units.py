@@ -5,7 +5,7 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.files import write_csv
-from creeping.plotting import _strokes, coloured_body, field_pictures, line_plots, pages, presenter
+from creeping.plotting import _strokes, coloured_body, field_pictures, line_plots, pages
 from creeping.plotting.coloured_body import currents_picture
 from creeping.plotting.field_pictures import decay_picture, surface_field_picture
 
@@ -16,23 +16,17 @@ def fan():
     return cr.launch(cr.DirectFlow(ball, rtol=1e-8), cr.shadow_line(ball, (0, 0.6, 0.8)), length=2.0, n_rays=24)
 
 
-def test_words_and_facts(fan):
+def test_words(fan):
     (curve,) = cr.iso_phase_curves(fan, 1.0)
     assert curve.unit == "m"
     for one in (fan.line, fan.line.curves[0], fan, curve):
         assert " m" in repr(one) and not any(word in repr(one) for word in (" L,", " L)", " L\n", "/L", " L at"))
-    facts = [presenter.of_line(fan.line), presenter.of_shadow_curve(fan.line.curves[0])]
-    facts += [presenter.of_fan(fan), presenter.of_curve(curve)]
-    for rows in facts:
-        told = dict(rows)
-        assert told["length"].endswith(" m")
-        assert not any(value.endswith(("L", "/L")) for value in told.values())
 
 
 def test_pictures_say_metres(fan, monkeypatch, tmp_path):
     curves = cr.iso_phase_curves(fan, [0.5, 1.0])
     assert _strokes.LevelColours.of(curves).words(0.5) == "travel time = 0.5 m"
-    ax = line_plots.plot_parameters(fan.line, fan, curves)
+    ax = line_plots.plot_line(fan.line, fan=fan, curves=curves)
     labels = [one.get_ylabel() for one in (*ax.figure.axes, *ax.child_axes)]
     assert "iso-phase curves: travel time (m)" in labels
     drawn, said = [], []

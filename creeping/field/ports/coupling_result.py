@@ -11,14 +11,12 @@ import numpy as np
 from creeping._presenting import Drawn, brief
 from creeping._typing import Any, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
-from creeping.field.results.labelled import ArrayResult, power
+from creeping.field.results.labelled import ArrayResult, Tabled, dataset, power
 from creeping.field.results.point_result import WithStatus
 from creeping.geometry.surface import Surface
 from creeping.rays.port_rays import PortRays
-from creeping.storage.memory import required
 
 if TYPE_CHECKING:
-    import pandas
     import xarray
 
 MEANINGS = {
@@ -72,7 +70,7 @@ class CouplingPaths:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Coupling(ArrayResult, WithStatus, Drawn):
+class Coupling(ArrayResult, WithStatus, Drawn, Tabled):
     """Matrix of fields between ports on a body; entry (i, j) is the field at port j of a unit source at port i.
 
     The field is u of e^{ikr}/(4 pi r) for `coupling`, H along slot j of a magnetic dipole along slot i for
@@ -203,7 +201,6 @@ class Coupling(ArrayResult, WithStatus, Drawn):
 
     def to_xarray(self) -> xarray.Dataset:
         """``xarray.Dataset`` of values, error, status and method, by source and receiver."""
-        library = required("xarray", use="labelled results need", extra="sweep")
         dims = ("source", "receiver")
         inverse = {"units": power(self.length_unit, -1)}
         units, meaning = self._kind
@@ -222,18 +219,7 @@ class Coupling(ArrayResult, WithStatus, Drawn):
         if len(set(self.kinds.tolist())) > 1:
             variables["moment"] = (*variables.pop("slot")[:2], {"long_name": "unit vector along the moment"})
             coordinates |= {f"{name}_kind": ((name,), self.kinds) for name in dims}
-        words = {"boundary": self.boundary, "order": self.order, "conventions": "time factor exp(-i omega t)"}
-        found: xarray.Dataset = library.Dataset(variables, coordinates, words)
-        return found
-
-    def to_dataframe(self) -> pandas.DataFrame:
-        """Contents of `to_xarray` as a ``pandas.DataFrame``, one row per entry."""
-        return (
-            self.to_xarray()
-            .drop_vars(["port", "slot", "moment"], errors="ignore")
-            .drop_dims("axis", errors="ignore")
-            .to_dataframe()
-        )
+        return dataset(variables, coordinates, boundary=self.boundary, order=self.order)
 
     def __repr__(self) -> str:
         names, counts = np.unique(self.method[~np.eye(len(self.ports), dtype=bool)], return_counts=True)

@@ -19,11 +19,6 @@ import numpy as np
 from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 
-OVERLAP = 0.9
-"""Share of the places that a shift has to leave."""
-FLOOR = 80.0
-"""Depth below the reference's largest value at which levels are cut off, dB."""
-
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
@@ -75,7 +70,7 @@ class Comparison:
     @property
     def austin(self) -> float:
         """Mean |residual|, dB, as in the Austin suite: levels are cut off 80 dB below the largest of the reference."""
-        least = self.reference.max() - FLOOR
+        least = self.reference.max() - 80.0
         return float(np.mean(np.abs(np.maximum(self.levels, least) - np.maximum(self.reference, least))))
 
     def summary(self) -> dict[str, float]:
@@ -147,7 +142,8 @@ def compare(
         x, y = np.append(x, x[0] + (period or 0.0)), np.append(y, y[0])
     # the least shift of those that are as good
     shifts = sorted(np.linspace(-align, align, 201) if align else np.zeros(1), key=abs)
-    least = OVERLAP * np.sum(_usable(x, y, _turned(x, at, period), given))
+    # a shift has to leave nine tenths of the places
+    least = 0.9 * np.sum(_usable(x, y, _turned(x, at, period), given))
     off = [_spread(x, y, _turned(x, at + shift, period), given, least) for shift in shifts]
     shift = float(shifts[int(np.nanargmin(off)) if np.any(np.isfinite(off)) else 0])
     places = _turned(x, at + shift, period)

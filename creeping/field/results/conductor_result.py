@@ -13,7 +13,7 @@ import numpy as np
 
 from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.field.results.labelled import ArrayResult
-from creeping.field.results.point_result import PointData, PointValues, by_polarisation, stated
+from creeping.field.results.point_result import PointData, PointValues, by_polarisation, stated, vector_dataset
 
 if TYPE_CHECKING:
     import xarray
@@ -102,8 +102,6 @@ class ConductorField(PointData):
 
     def to_xarray(self) -> xarray.Dataset:
         """``xarray.Dataset`` of E, H, their parts, error and status, by point, component and polarisation."""
-        from creeping.field.results.point_result import vector_dataset
-
         parts = {f"{letter}_{name}": getattr(getattr(self, name), letter) for name in PARTS for letter in "EH"}
         return vector_dataset(self, {"E": self.E, "H": self.H, **parts})
 
@@ -165,8 +163,6 @@ class ConductorCurrent(ArrayResult, PointData):
 
     def to_xarray(self) -> xarray.Dataset:
         """``xarray.Dataset`` of J, its parts, charge, error and status, by point and component."""
-        from creeping.field.results.point_result import vector_dataset
-
         parts = {"J": self.values, "charge": self.charge, "lit": self.lit, "creeping": self.creeping}
         return vector_dataset(self, parts | {"charge_error": self.charge_error})
 

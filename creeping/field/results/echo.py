@@ -19,11 +19,9 @@ from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.frequency import frequency
 from creeping.field.results.comparison import cross_section_decibels, decibels
-from creeping.field.results.labelled import power
-from creeping.storage.memory import required
+from creeping.field.results.labelled import Tabled, dataset, power
 
 if TYPE_CHECKING:
-    import pandas
     import xarray
 
 LEVELS = {"rcs": ("radar cross section", "dBsm"), "ts": ("target strength", "dB re 1 m")}
@@ -31,7 +29,7 @@ LEVELS = {"rcs": ("radar cross section", "dBsm"), "ts": ("target strength", "dB 
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Echo(Drawn):
+class Echo(Drawn, Tabled):
     """Echo in c channels at n angles and k wavenumbers; lengths are in metres.
 
     Attributes
@@ -139,11 +137,25 @@ class Echo(Drawn):
 
     def to_xarray(self) -> xarray.Dataset:
         """``xarray.Dataset`` of amplitude, parts, level, error and flags by channel, angle and frequency."""
-        return echo_dataset(self)
-
-    def to_dataframe(self) -> pandas.DataFrame:
-        """Contents of `to_xarray` as a ``pandas.DataFrame``, one row per value."""
-        return self.to_xarray().to_dataframe()
+        dims = ("channel", "angle", "frequency")
+        coordinates: dict[str, Any] = {
+            "channel": (("channel",), list(self.channels)),
+            "angle": (("angle",), self.angles, {"units": "degree", "long_name": self.angle_name or "angle"}),
+            "azimuth": (("angle",), self.azimuth, {"units": "degree"}),
+            "elevation": (("angle",), self.elevation, {"units": "degree"}),
+            "frequency": (("frequency",), self.hertz, {"units": "Hz"}),
+            "wavenumber": (("frequency",), self.wavenumbers, {"units": power("m", -1), "long_name": "k"}),
+        }
+        name, unit = self.level_name
+        variables: dict[str, Any] = {
+            "total": (dims, self.total, {"units": "m", "long_name": "far-field amplitude f"}),
+            "level": (dims, self.levels(), {"units": unit, "long_name": name}),
+            "error": (dims, self.error, {"units": "m", "long_name": "error of |f|"}),
+            "unresolved": (dims, self.unresolved, {"long_name": "an expansion fails, or the error is large"}),
+            "by_currents": (dims, self.by_currents, {"long_name": f"else by {self.otherwise}"}),
+        }
+        variables |= {part: (dims, values, {"units": "m"}) for part, values in self.parts.items()}
+        return dataset(variables, coordinates)
 
     def summary(self) -> dict[str, Any]:
         """Sizes, largest level of each channel, error and number of unresolved values, by name."""
@@ -173,29 +185,3 @@ class Echo(Drawn):
 
 def _finite(value: Any) -> float | None:
     return float(value) if np.isfinite(value) else None
-
-
-def echo_dataset(echo: Echo) -> xarray.Dataset:
-    """An echo with its parts, levels, error and flags: see `Echo.to_xarray`."""
-    library = required("xarray", use="labelled results need", extra="sweep")
-    dims = ("channel", "angle", "frequency")
-    coordinates: dict[str, Any] = {
-        "channel": (("channel",), list(echo.channels)),
-        "angle": (("angle",), echo.angles, {"units": "degree", "long_name": echo.angle_name or "angle"}),
-        "azimuth": (("angle",), echo.azimuth, {"units": "degree"}),
-        "elevation": (("angle",), echo.elevation, {"units": "degree"}),
-        "frequency": (("frequency",), echo.hertz, {"units": "Hz"}),
-        "wavenumber": (("frequency",), echo.wavenumbers, {"units": power("m", -1), "long_name": "k"}),
-    }
-    name, unit = echo.level_name
-    amplitude = {"units": "m", "long_name": "far-field amplitude f"}
-    variables: dict[str, Any] = {
-        "total": (dims, echo.total, amplitude),
-        "level": (dims, echo.levels(), {"units": unit, "long_name": name}),
-        "error": (dims, echo.error, {"units": "m", "long_name": "error of |f|"}),
-        "unresolved": (dims, echo.unresolved, {"long_name": "an expansion fails, or the error is large"}),
-        "by_currents": (dims, echo.by_currents, {"long_name": f"else by {echo.otherwise}"}),
-    }
-    variables |= {part: (dims, values, {"units": "m"}) for part, values in echo.parts.items()}
-    found: xarray.Dataset = library.Dataset(variables, coordinates, {"conventions": "time factor exp(-i omega t)"})
-    return found

@@ -22,33 +22,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creeping._presenting import Drawn
-from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
+from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray, IntArray
+from creeping.errors import InvalidInputError
 from creeping.field.results.comparison import cross_section_decibels, decibels
-from creeping.field.results.labelled import COMPONENTS, directed, power
+from creeping.field.results.labelled import COMPONENTS, Tabled, dataset, directed, power
 from creeping.field.validity_range import Validity, validity_numbers
+from creeping.geometry.arguments import shown
 
 if TYPE_CHECKING:
-    import pandas
     import xarray
-
-from creeping._typing import ArrayLike
-from creeping.errors import InvalidInputError
-from creeping.geometry.arguments import shown
-from creeping.storage.memory import required
 
 BY_DIRECTION = ("directions", "total", "method", "unresolved", "error")
 """Arrays of a far field whose first axis is the direction, its parts apart."""
 
-ONE_EACH = ("error_by", "wavenumber", "boundary", "order", "measured_at", "unit")
-"""What all directions share."""
-CLEAR = 1e-6
-"""Least |n × d| that has a direction: normals are known to 1e-11, and d and r share ``spare`` to this angle."""
-ACROSS = 1e-6
-"""Share of an incident E0 up to which it may lie along the direction, by rounding."""
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FarField(Drawn):
+class FarField(Drawn, Tabled):
     """Far-field amplitude f, L, in m directions; for a conductor a matrix, scattered (θ̂, φ̂) by incident (θ̂, φ̂).
 
     Attributes
@@ -159,7 +148,8 @@ class FarField(Drawn):
     def packed(self) -> dict[str, np.ndarray[Any, Any]]:
         """Arrays of numbers (m, ...) for storage; `unpacked` restores the far field from them."""
         names, codes = np.unique(self.method, return_inverse=True)
-        words = {name: getattr(self, name) for name in ONE_EACH}
+        shared = ("error_by", "wavenumber", "boundary", "order", "measured_at", "unit")
+        words = {name: getattr(self, name) for name in shared}
         words |= {"methods": names.tolist(), "validity": None if self.validity is None else list(self.validity)}
         arrays = {name: getattr(self, name) for name in BY_DIRECTION if name != "method"}
         arrays |= {f"part_{name}": values for name, values in self.parts.items()}
@@ -196,11 +186,23 @@ class FarField(Drawn):
         The dimension is ``direction``; a conductor has ``scattered`` and ``incident`` too, with "theta" and "phi".
         Coordinates of the directions are ``vector``, and ``azimuth`` and ``elevation`` in degrees.
         """
-        return far_dataset(self)
-
-    def to_dataframe(self) -> pandas.DataFrame:
-        """Contents of `to_xarray` as a ``pandas.DataFrame``: one row per direction and, for a conductor, component."""
-        return self.to_xarray().drop_vars("vector").drop_dims("axis", errors="ignore").to_dataframe()
+        unit = self.unit
+        dims = ("direction", "scattered", "incident")[: self.total.ndim]
+        coordinates = directed(self.directions, self.wavenumber, unit)
+        if self.total.ndim == 3:
+            coordinates |= {name: ((name,), list(COMPONENTS)) for name in dims[1:]}
+        variables: dict[str, Any] = {"total": (dims, self.total, {"units": unit, "long_name": "far-field amplitude f"})}
+        for name, values in self.parts.items():
+            variables[name] = (dims, values, {"units": unit, "long_name": f"{name} part of f"})
+        area = {"units": power(unit, 2), "long_name": "cross section 4 pi |f|^2"}
+        doubt = {"long_name": "an expansion fails, or the error is large"}
+        variables |= {
+            "error": (dims, self.error, {"units": unit, "long_name": f"error of |f|, by {self.error_source}"}),
+            "cross_section": (dims, self.cross_section, area),
+            "unresolved": (("direction",), self.unresolved, doubt),
+            "method": (("direction",), self.method, {"long_name": "the method used"}),
+        }
+        return dataset(variables, coordinates, boundary=self.boundary, order=self.order)
 
     def __repr__(self) -> str:
         names, counts = np.unique(self.method, return_counts=True)
@@ -287,7 +289,8 @@ def incident_mix(polarisation: str | ArrayLike | None, direction: FloatArray) ->
         )
     given = given / np.linalg.norm(given)
     along = abs(given @ direction)
-    if along > ACROSS:
+    # what rounding leaves of a wave across the direction
+    if along > 1e-6:
         raise InvalidInputError(
             f"polarisation = {shown(polarisation)} has {100 * along:.3g} % of itself along the direction of incidence; "
             "give E0 across it"
@@ -323,7 +326,8 @@ def wave_frame(normals: FloatArray, directions: FloatArray, spare: FloatArray) -
     """
     s = np.cross(normals, directions)
     long = np.linalg.norm(s, axis=-1, keepdims=True)
-    clear = long > CLEAR * np.linalg.norm(normals, axis=-1, keepdims=True)
+    # normals are known to 1e-11, and d and r share ``spare`` to this angle
+    clear = long > 1e-6 * np.linalg.norm(normals, axis=-1, keepdims=True)
     s = np.where(clear, s / np.where(clear, long, 1.0), spare)
     return np.stack([s, np.cross(s, directions)], axis=-2)
 
@@ -336,28 +340,3 @@ def dyads(incoming: FloatArray, outgoing: FloatArray, direction: FloatArray, obs
     received = incoming @ np.swapaxes(spherical_frame(direction), -1, -2)
     sent = np.einsum("nkc,noc->nko", outgoing, spherical_frame(observers))
     return np.asarray(sent[..., :, None] * received[..., None, :])
-
-
-def far_dataset(far: FarField) -> xarray.Dataset:
-    """A far field, its parts, error and cross section, by direction: see `FarField.to_xarray`."""
-    library = required("xarray", use="labelled results need", extra="sweep")
-    unit = far.unit
-    dims = ("direction", "scattered", "incident")[: far.total.ndim]
-    coordinates = directed(far.directions, far.wavenumber, unit)
-    if far.total.ndim == 3:
-        coordinates |= {name: ((name,), list(COMPONENTS)) for name in dims[1:]}
-    variables: dict[str, Any] = {"total": (dims, far.total, {"units": unit, "long_name": "far-field amplitude f"})}
-    for name, values in far.parts.items():
-        variables[name] = (dims, values, {"units": unit, "long_name": f"{name} part of f"})
-    variables["error"] = (dims, far.error, {"units": unit, "long_name": f"error of |f|, by {far.error_source}"})
-    area = {"units": power(unit, 2), "long_name": "cross section 4 pi |f|^2"}
-    variables["cross_section"] = (dims, far.cross_section, area)
-    variables["unresolved"] = (
-        ("direction",),
-        far.unresolved,
-        {"long_name": "an expansion fails, or the error is large"},
-    )
-    variables["method"] = (("direction",), far.method, {"long_name": "the method used"})
-    words = {"boundary": far.boundary, "order": far.order, "conventions": "time factor exp(-i omega t)"}
-    found: xarray.Dataset = library.Dataset(variables, coordinates, words)
-    return found

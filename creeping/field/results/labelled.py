@@ -2,17 +2,27 @@
 
 Units are those of the CF conventions where the body's unit is known, else powers of L, the body's unit of length.
 
-`ArrayResult`: arithmetic, ufuncs and numpy's functions give plain arrays; so do indexing, the methods that arrays have,
-and arithmetic in place, after which the name stands for the array. Nothing writes into a result.
+`Tabled`: results with names on their axes. `ArrayResult`: arithmetic, ufuncs and numpy's functions give plain arrays;
+so do indexing, the methods that arrays have, and arithmetic in place, after which the name stands for the array.
+Nothing writes into a result.
 """
 
+# help() shows names of types instead of what they stand for
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.geometry.directions import azimuth_elevation_of
+from creeping.storage.memory import required
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 COMPONENTS = ("theta", "phi")
 """Components of an incident and a scattered wave of a conductor, along the unit vectors of the angles."""
@@ -35,6 +45,35 @@ def power(unit: str, exponent: int) -> str:
     return f"1/{unit}" if exponent == -1 else f"1/{unit}^{-exponent}"
 
 
+def dataset(variables: dict[str, Any], coordinates: dict[str, Any], **words: Any) -> xarray.Dataset:
+    """``xarray.Dataset`` of variables and coordinates by name, with words on the whole as attributes.
+
+    Raises
+    ------
+    CreepingError
+        If xarray is missing, with the command that installs it.
+    """
+    library = required("xarray", use="labelled results need", extra="sweep")
+    words = words | {"conventions": "time factor exp(-i omega t)"}
+    found: xarray.Dataset = library.Dataset(variables, coordinates, words)
+    return found
+
+
+class Tabled:
+    """Base of results with names on their axes."""
+
+    # no state: results stay frozen dataclasses
+    __slots__ = ()
+
+    def to_xarray(self) -> xarray.Dataset:
+        """``xarray.Dataset`` of values, parts, error and status."""
+        raise NotImplementedError
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Contents of `to_xarray` as a ``pandas.DataFrame``, one row per value, without vectors."""
+        return self.to_xarray().drop_dims("axis", errors="ignore").to_dataframe()
+
+
 def directed(directions: FloatArray, wavenumber: float, unit: str) -> dict[str, Any]:
     """Coordinates of results by direction (m, 3)."""
     azimuth, elevation = azimuth_elevation_of(directions)
@@ -50,14 +89,14 @@ def directed(directions: FloatArray, wavenumber: float, unit: str) -> dict[str, 
 def _of_values(name: str) -> Callable[..., Any]:
     """Method of that name of the values."""
 
-    def method(self: "ArrayResult", *args: Any, **options: Any) -> Any:
+    def method(self: ArrayResult, *args: Any, **options: Any) -> Any:
         return getattr(self.values, name)(*args, **options)
 
     method.__name__, method.__doc__ = name, f"Apply `numpy.ndarray.{name}` to the values."
     return method
 
 
-def _not_in_place(self: "ArrayResult", other: Any) -> Any:
+def _not_in_place(self: ArrayResult, other: Any) -> Any:
     """Leave it to the operator that makes a new array."""
     return NotImplemented
 

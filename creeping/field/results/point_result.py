@@ -19,17 +19,13 @@ import numpy as np
 
 from creeping._presenting import Shown
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
-from creeping.field.results.labelled import COMPONENTS, ArrayResult, power
+from creeping.field.results.labelled import COMPONENTS, ArrayResult, Tabled, dataset, power
 from creeping.field.validity_range import Validity
-from creeping.storage.memory import required
 
 if TYPE_CHECKING:
-    import pandas
     import xarray
 
 _AWAY = "use method='currents', a quarter of a wavelength or more off the body"
-WORTH, LEAST_WORTH = 0.5, 0.1
-"""Error from which a value is unresolved: both this share of it, and this one of the incident wave."""
 
 
 Words = np.ndarray[Any, np.dtype[np.str_]]
@@ -81,7 +77,8 @@ def judged(
 ) -> IntArray:
     """Status (...) with UNRESOLVED in place of OK; ``unit`` is the incident wave's amplitude, k (1/L) for du/dn."""
     with np.errstate(invalid="ignore"):
-        enough = (error <= np.maximum(WORTH * np.abs(values), LEAST_WORTH * unit)) & (error_by != "bound")
+        # half the value, or a tenth of the incident wave: as `FieldStatus.UNRESOLVED` says
+        enough = (error <= np.maximum(0.5 * np.abs(values), 0.1 * unit)) & (error_by != "bound")
     return np.where((status == FieldStatus.OK) & ~enough, FieldStatus.UNRESOLVED, status).astype(np.int64)
 
 
@@ -104,7 +101,7 @@ class WithStatus:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PointData(Shown, WithStatus):
+class PointData(Shown, WithStatus, Tabled):
     """Attributes shared by all fields at points (...); arrays have the shape of the points.
 
     Attributes
@@ -150,14 +147,6 @@ class PointData(Shown, WithStatus):
     def magnitude(self) -> FloatArray:
         """Magnitude of the field, in the shape of ``status``."""
         raise NotImplementedError
-
-    def to_xarray(self) -> xarray.Dataset:
-        """``xarray.Dataset`` of values, parts, error and status, one row per point."""
-        raise NotImplementedError
-
-    def to_dataframe(self) -> pandas.DataFrame:
-        """Contents of `to_xarray` as a ``pandas.DataFrame``, one row per point."""
-        return self.to_xarray().to_dataframe()
 
     def __repr__(self) -> str:
         names, counts = np.unique(self.method, return_counts=True)
@@ -437,7 +426,6 @@ def _of_points(
     field: PointData, variables: dict[str, Any], rows: tuple[str, ...], named: dict[str, Any]
 ) -> xarray.Dataset:
     """Variables with error, status and coordinates of points."""
-    library = required("xarray", use="labelled results need", extra="sweep")
     flat = field.points.reshape(-1, 3)
     coordinates: dict[str, Any] = {
         name: (("point",), flat[:, i], {"units": field.length_unit}) for i, name in enumerate(("x", "y", "z"))
@@ -448,6 +436,4 @@ def _of_points(
     variables["error"] = (rows, field.error.reshape(shape), {"units": field.unit})
     for name in ("error_by", "status", "method"):
         variables[name] = (rows, np.reshape(getattr(field, name), shape), {})
-    words = {"boundary": field.boundary, "order": field.order, "conventions": "time factor exp(-i omega t)"}
-    found: xarray.Dataset = library.Dataset(variables, coordinates | named, words)
-    return found
+    return dataset(variables, coordinates | named, boundary=field.boundary, order=field.order)

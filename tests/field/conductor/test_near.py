@@ -144,7 +144,7 @@ def test_tables_and_words(field, ball):
     table = current.to_dataframe()
     assert {"J", "charge", "error", "method"} <= set(table.columns) and len(table) == 6
     assert repr(field).startswith(f"ConductorField({len(field.points)} points, k = 30, pec, order 2)")
-    assert "served by currents" in field._repr_html_() and "served by lit" in current._repr_html_()
+    assert "currents (" in field._repr_html_() and "lit (" in current._repr_html_()
 
 
 @pytest.mark.parametrize(
