@@ -22,6 +22,7 @@ from creeping._version import __version__
 from studies.gallery.reference import write_reference
 
 PAGES = Path(__file__).parent / "pages"
+NOTEBOOKS = Path(__file__).parent / "notebooks"
 THUMBNAIL = 480
 """Pixels of the width of a thumbnail."""
 STYLE = """\
@@ -35,7 +36,7 @@ CONFIGURATION: dict[str, Any] = {
     "copyright": "the creeping developers",
     "version": __version__,
     "release": __version__,
-    "extensions": ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"],
+    "extensions": ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"],
     "autodoc_default_options": {"members": True, "exclude-members": "__init__, __new__"},
     "autodoc_typehints": "none",
     "autodoc_class_signature": "mixed",
@@ -45,6 +46,10 @@ CONFIGURATION: dict[str, Any] = {
     # attributes of several results have one name
     "suppress_warnings": ["ref.python"],
     "myst_heading_anchors": 3,
+    "nb_execution_in_temp": True,
+    "nb_execution_raise_on_error": True,
+    "nb_execution_timeout": 600,
+    "nb_merge_streams": True,
     "smartquotes": False,
     "html_theme": "furo",
     "html_title": "creeping",
@@ -82,7 +87,7 @@ def build_site(
     quick : bool
         Coarser figures, drawn faster.
     pages_only : bool
-        Draw no figures: the gallery stays empty.
+        Draw no figures and run no notebooks: the gallery stays empty, and notebooks have no outputs.
     progress : callable
         Called with a line of text for each figure and before Sphinx starts.
 
@@ -98,7 +103,7 @@ def build_site(
     CreepingError
         If Sphinx is missing or warns, with its warnings.
     """
-    missing = [package for package in ("sphinx", "myst_parser", "furo") if find_spec(package) is None]
+    missing = [package for package in ("sphinx", "myst_nb", "furo") if find_spec(package) is None]
     if missing:
         raise CreepingError(f"the site needs {' and '.join(missing)}: pip install 'creeping[docs]'")
     unknown = [name for name in names if name not in studies.FIGURES]
@@ -113,13 +118,14 @@ def build_site(
     with tempfile.TemporaryDirectory(prefix="creeping-site-") as work:
         sources = Path(work) / "sources"
         gather(sources, cards, folder / "figures")
-        make_html(sources, folder, Path(work) / "doctrees")
+        make_html(sources, folder, Path(work) / "doctrees", run_notebooks=not pages_only)
     return folder / "index.html"
 
 
 def gather(sources: Path, cards: list[dict[str, Any]], figures: Path) -> None:
-    """Write what Sphinx reads: pages, gallery, pictures, thumbnails and the style."""
+    """Write what Sphinx reads: pages, notebooks, gallery, pictures, thumbnails and the style."""
     shutil.copytree(PAGES, sources)
+    shutil.copytree(NOTEBOOKS, sources / "notebooks")
     for name in ("gallery/thumbs", "figures", "style"):
         (sources / name).mkdir(parents=True)
     (sources / "style" / "custom.css").write_text(STYLE, encoding="utf-8")
@@ -145,23 +151,24 @@ def thumbnail(picture: Path, target: Path) -> None:
         small.save(target)
 
 
-def make_html(sources: Path, folder: Path, doctrees: Path) -> None:
+def make_html(sources: Path, folder: Path, doctrees: Path, *, run_notebooks: bool) -> None:
     """Run Sphinx.
 
     Raises
     ------
     CreepingError
-        If it warns or fails.
+        If it warns or fails, or a cell of a notebook does.
     """
     from sphinx.application import Sphinx
     from sphinx.errors import SphinxError
     from sphinx.util.docutils import docutils_namespace, patch_docutils
 
     warnings = StringIO()
+    configuration = CONFIGURATION | {"nb_execution_mode": "force" if run_notebooks else "off"}
     try:
         with patch_docutils(), docutils_namespace():
             app = Sphinx(
-                sources, None, folder, doctrees, "html", CONFIGURATION, status=None, warning=warnings, freshenv=True
+                sources, None, folder, doctrees, "html", configuration, status=None, warning=warnings, freshenv=True
             )
             # before napoleon reads them
             app.connect("autodoc-process-docstring", _plain_lines, priority=400)

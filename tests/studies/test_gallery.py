@@ -187,7 +187,7 @@ def test_tables_are_printed_as_they_are_asked_for(capsys):
 @pytest.mark.slow
 def test_site_of_one_figure(tmp_path):
     """Built by its command, quickly: it loads nothing from a network, and shows what study and sidecar tell."""
-    for package in ("sphinx", "myst_parser", "furo"):
+    for package in ("sphinx", "myst_nb", "furo"):
         pytest.importorskip(package)
     words = [sys.executable, "-m", "studies.gallery", "-o", str(tmp_path / "site"), "--quick", CHEAP]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
