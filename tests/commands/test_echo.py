@@ -116,8 +116,8 @@ def test_what_may_take_minutes_is_told_before():
     band = echo_request("ts", **asked)
     radar = band.angles(fish)
     told = forecast(fish, band.wavenumbers, "soft", radar=radar, metres=True)
-    # by currents it took 75 minutes
-    assert "the integral equation" in told.by and 10 <= float(re.search(r"about ([\d.]+) min", told.by)[1]) <= 75
+    # by currents it took 75 minutes, by the equation of the whole body 15
+    assert "the integral equation" in told.by and 2 <= float(re.search(r"about ([\d.]+) min", told.by)[1]) <= 75
     assert re.search(r"0\.14 m, 3.6 to 19 wavelengths across$", told.body)
     assert "rays alone, in seconds" in forecast(fish, band.wavenumbers, "soft", radar=radar, method="rays").by
 
