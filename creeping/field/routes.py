@@ -180,14 +180,7 @@ def currents_near(problem: Problem, places: int) -> SurfaceCurrents | None:
         As `creeping.surface_currents`, the latter where nothing but currents will do.
     """
     must = problem.needs_currents or problem.kind.varies
-    if not must and not affords(problem, places):
-        return None
-    try:
-        return currents_of(problem)
-    except SurfaceError:
-        if must:
-            raise
-        return None
+    return _meshed(problem, must=must) if must or affords(problem, places) else None
 
 
 def solved_by_itself(problem: Problem) -> SurfaceCurrents | None:
@@ -259,6 +252,11 @@ def far_currents(problem: Problem, directions: int) -> SurfaceCurrents | None:
     count = len(scalar_boundaries(boundary)) * directions
     if not must and not (serve and auto and affordable(fan, count, k, distant=True)):
         return None
+    return _meshed(problem, must=must)
+
+
+def _meshed(problem: Problem, *, must: bool) -> SurfaceCurrents | None:
+    """Currents; None if there is no mesh for them, unless they ``must`` be."""
     try:
         return currents_of(problem)
     except SurfaceError:

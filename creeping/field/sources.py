@@ -24,8 +24,7 @@ from creeping.errors import InvalidInputError, SingularIncidenceError
 from creeping.field.arguments import checked, checked_plain, observers_of
 from creeping.field.boundary import BoundaryLike, boundary_name
 from creeping.field.equation.effort import SECONDS, plan_of
-from creeping.field.equation.solution import Solution
-from creeping.field.equation.solving import is_rough, solved_alone
+from creeping.field.equation.solving import is_rough, solution_for, solve_together
 from creeping.field.near import MISSING, near_field
 from creeping.field.results.labelled import ArrayResult, Tabled, dataset, directed
 from creeping.field.results.point_result import FieldStatus, NearField, WithStatus
@@ -142,7 +141,7 @@ def source_pattern(
     boundary : "soft", "hard" or ImpedanceBoundary
         A source on a soft body radiates nothing.
     n_rays : int
-        Number of rays for each direction.
+        Number of rays for each direction, where rays serve.
 
     Returns
     -------
@@ -178,9 +177,13 @@ def source_pattern(
     values, error = np.zeros(shape, dtype=complex), np.full(shape, MISSING)
     status = np.full(shape, int(FieldStatus.UNRESOLVED))
     error_by, method = np.full(shape, "bound", dtype="<U24"), np.full(shape, "none", dtype="<U16")
-    solution = _solution(flow.body, r, k, boundary)
+    together = _solved_together(flow.body, r, k, boundary)
     for row, towards in enumerate(r):
-        received = solution.near_field(x, row) if solution else _received(flow, x, towards, k, boundary, n_rays)
+        solved = solution_for(flow.body, -towards, k, boundary) if together else None
+        if solved:
+            received: NearField | None = solved.solution.near_field(x, solved.incidence)
+        else:
+            received = _received(flow, x, towards, k, boundary, n_rays)
         if received is not None:
             values[row], error[row], status[row] = received.values, received.error, received.status
             error_by[row], method[row] = received.error_by, received.method
@@ -198,12 +201,13 @@ def source_pattern(
     )
 
 
-def _solution(body: Surface, towards: FloatArray, k: float, boundary: BoundaryLike) -> Solution | None:
-    """The equation solved for plane waves from directions (m, 3), if that takes no longer than rays."""
+def _solved_together(body: Surface, towards: FloatArray, k: float, boundary: BoundaryLike) -> bool:
+    """Solve the equation for plane waves from directions (m, 3) and keep it, if that takes no longer than rays."""
     plan = plan_of(body, k, boundary, incidences=len(towards))
-    if is_rough(body) or plan.refused or plan.effort.coarse or plan.seconds > SECONDS + BY_RAYS * len(towards):
-        return None
-    return solved_alone(body, -towards, k, boundary)
+    pays = not plan.refused and not plan.effort.coarse and plan.seconds <= SECONDS + BY_RAYS * len(towards)
+    if pays and not is_rough(body):
+        solve_together(body, -towards, k, boundary)
+    return pays
 
 
 def _received(

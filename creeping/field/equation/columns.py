@@ -24,7 +24,7 @@ from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import Boundary
 from creeping.field.equation.matrix import Matrix, Places
-from creeping.field.equation.mirrors import Blocks, mirrors_of, no_mirrors
+from creeping.field.equation.mirrors import blocks_of, mirrors_of, no_mirrors
 from creeping.field.equation.split_sums import CURL, ONE_LAYER, TWO_LAYERS, SmoothKernel, SplitSums, best_split
 from creeping.storage.memory import budget
 from creeping.storage.parts import Arrays, Keeping, not_kept
@@ -95,30 +95,32 @@ def solved_columns(
     right[matrix.at] -= 1j * under.reshape(len(matrix.at), *right.shape[1:])
     right = (right * matrix.root[:, None, None]).reshape(nodes * c, -1)
     n, columns = right.shape
-    mirrors = mirrors_of(matrix.nodes, matrix.root, matrix.boundary)
+    mirrors = mirrors_of(matrix.tiles, matrix.boundary)
     dense = is_dense(nodes, matrix.boundary, len(mirrors.images))
     if not dense:
         mirrors = no_mirrors(nodes, c)
     parts = len(mirrors.images)
     many = max(1, min(columns, int(parts * TOGETHER / (8 * n * (steps + 1)))))
     values, change, left = np.empty_like(right), np.empty_like(right), np.empty(columns)
-    made: list[Blocks | SplitProduct] = []
+    products: list[Callable[[Any], Any]] = []
     taken = 0
 
     def solved(at: slice) -> Arrays:
-        if not made:
-            made.append(Blocks(matrix, mirrors) if dense else SplitProduct(matrix))
+        if not products:
+            blocks = blocks_of(matrix, mirrors) if dense else ()
+            products.extend([partial(_times, block) for block in blocks] or [SplitProduct(matrix)])
         if at.start:
             tell(f"right side {at.start} of {columns}")
         rest = mirrors.shares(right[:, at])
         size = np.linalg.norm(rest, axis=1)
         begun = np.zeros((parts, 0, 0)) if first_guess is None else mirrors.shares(first_guess[:, at])
         solution, left, used = np.zeros_like(rest), np.zeros_like(size), 0
-        for number in range(parts):
-            product = partial(made[0].product, number)
+        for number, product in enumerate(products):
             if begun.size:
-                solution[number] = begun[number]
-                rest[number] -= product(begun[number])
+                after = rest[number] - product(begun[number])
+                # optics has faces along the wave lit here and dark there: such odd fields are worse than none
+                better = np.linalg.norm(after, axis=0) < size[number]
+                solution[number], rest[number] = begun[number] * better, np.where(better, after, rest[number])
             # waves along a plane have no odd fields in it but for rounding
             some = np.flatnonzero(size[number] > tolerance * ODD * np.linalg.norm(size, axis=0))
             found = block_gmres(product, rest[number][:, some], tolerance, steps, size=size[number, some])
@@ -139,8 +141,13 @@ def solved_columns(
     return Columns(values.reshape(nodes, c, -1) / back, change.reshape(nodes, c, -1) / back, left, taken)
 
 
+def _times(block: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """A block of the matrix times columns (n, m), single precision."""
+    return np.asarray(block @ values.astype(np.complex64, copy=False))
+
+
 def block_gmres(
-    product: Callable[[ComplexArray], ComplexArray],
+    product: Callable[[Any], Any],
     right: ComplexArray,
     tolerance: float,
     steps: int,
@@ -173,14 +180,14 @@ def block_gmres(
     whole = norm if size is None else size
     scale = np.where(whole > 0, whole, 1.0)
     # in single precision, as products are
-    basis = np.empty((m, steps + 1, n), dtype=np.complex64)
+    basis: Any = np.empty((m, steps + 1, n), dtype=np.complex64)
     basis[:, 0] = (right / np.where(norm > 0, norm, 1.0)).T
     H = np.zeros((m, steps + 1, steps), dtype=complex)
     used, left, y = 0, norm / scale, np.zeros((m, steps), dtype=complex)
     for step in range(steps):
         if np.all(left <= tolerance):
             break
-        new = np.ascontiguousarray(product(basis[:, step].T.astype(complex)).T, dtype=np.complex64)
+        new = np.ascontiguousarray(product(basis[:, step].T).T, dtype=np.complex64)
         # twice, for the sake of rounding
         for _ in range(2):
             along = np.conj(basis[:, : step + 1] @ np.conj(new)[:, :, None])
@@ -204,7 +211,7 @@ def block_gmres(
 
 
 class SplitProduct:
-    """Products of a matrix that is not kept with columns."""
+    """A matrix that is not kept: it multiplies columns by sums over the nodes."""
 
     def __init__(self, matrix: Matrix) -> None:
         self._of, k = matrix, matrix.k
@@ -223,8 +230,8 @@ class SplitProduct:
         self._own = _correction(matrix, nodes, matrix.root, "double")
         self._under = _correction(matrix, inner, matrix.root[matrix.at], "slope" if matrix.soft else "double")
 
-    def product(self, number: int, values: ComplexArray) -> ComplexArray:
-        """The matrix times columns (n, m); ``number`` is 0, for it is in one block."""
+    def __call__(self, values: ComplexArray) -> ComplexArray:
+        """The matrix times columns (n, m)."""
         matrix = self._of
         own, under = self._vectors(values) if matrix.vector else self._scalars(values)
         small = values.astype(np.complex64)

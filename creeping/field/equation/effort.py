@@ -18,7 +18,7 @@ from creeping.errors import SurfaceError
 from creeping.field.boundary import CONDUCTOR, HARD, Boundary, BoundaryLike, scalar_boundaries
 from creeping.field.equation.body_tiles import body_tiles
 from creeping.field.equation.columns import STEPS, TOGETHER, is_dense, matrix_bytes
-from creeping.field.equation.matrix import EACH, VECTOR, Places
+from creeping.field.equation.matrix import EACH, VECTOR
 from creeping.field.equation.mirrors import mirrors_of
 from creeping.field.equation.split_sums import CURL, ONE_LAYER, TWO_LAYERS, SmoothKernel, best_split
 from creeping.field.equation.tiles import Tiles
@@ -183,8 +183,7 @@ def load_on(tiles: Tiles, wavenumber: float, kind: Boundary) -> Load:
     nodes, vector = len(tiles.points), kind.kind == "conductor"
     near = near_seconds(nodes, tiles.p, kind, flat=tiles.planar)
     entries = float(nodes) ** 2 * (4 if vector else 1)
-    places = Places.at(tiles.points, tiles.normals, tiles.own_places)
-    parts = len(mirrors_of(places, np.sqrt(tiles.weights), kind).images)
+    parts = len(mirrors_of(tiles, kind).images)
     whole = matrix_bytes(nodes, kind, parts)
     if is_dense(nodes, kind, parts):
         once = (near + pair_seconds(nodes, kind)) / parts
@@ -192,8 +191,8 @@ def load_on(tiles: Tiles, wavenumber: float, kind: Boundary) -> Load:
     load = CURL if vector else ONE_LAYER if kind.kind in ("soft", "hard") else TWO_LAYERS
     widths = np.ptp(tiles.points, axis=0)
     # as many points beneath the nodes
-    both = np.concatenate([tiles.points, tiles.points])
-    best = best_split(lambda a: SmoothKernel(wavenumber, widths, a), both, tiles.points, load, np.inf)
+    places = np.concatenate([tiles.points, tiles.points])
+    best = best_split(lambda a: SmoothKernel(wavenumber, widths, a), places, tiles.points, load, np.inf)
     sparse = 2e4 * nodes * (4 if vector else 1) * max(tiles.p, 2) ** 2 / 25
     if best is None:
         return Load(nodes, near, near, np.inf, whole, parts)

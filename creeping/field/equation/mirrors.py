@@ -14,13 +14,15 @@ Sources: [K05]; Derivations, F36.
 """
 
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
 from creeping.field.equation.matrix import BLOCK, Matrix, Places
+from creeping.field.equation.tiles import Tiles
+from creeping.geometry.memo import memo
 
 FLIPS: tuple[tuple[int, ...], ...] = (0,), (1,), (2,), (0, 1), (0, 2), (1, 2), (0, 1, 2)
 FEW = 32
@@ -79,21 +81,32 @@ class Mirrors(NamedTuple):
         return out.reshape(-1, shares.shape[2])
 
 
-def mirrors_of(nodes: Places, root: FloatArray, boundary: Boundary, center: FloatArray | None = None) -> Mirrors:
-    """Symmetries about a centre, that of the nodes if it is not given, of nodes with weights root^2.
+def mirrors_of(tiles: Tiles, boundary: Boundary, center: FloatArray | None = None) -> Mirrors:
+    """Symmetries of the nodes of tiles about a centre, their own if it is not given; none where the admittance varies.
 
-    None where the admittance varies.
+    Those about their own centre are found once.
     """
-    n, c = len(root), 2 if boundary.kind == "conductor" else 1
-    middle = 0.5 * (nodes.points.max(axis=0) + nodes.points.min(axis=0)) if center is None else center
-    x = nodes.points - middle
+    n, c = len(tiles.points), 2 if boundary.kind == "conductor" else 1
+    if boundary.varies:
+        return no_mirrors(n, c)
+    if center is not None:
+        return _found(tiles, c, center)
+    middle = 0.5 * (tiles.points.max(axis=0) + tiles.points.min(axis=0))
+    return memo(tiles, f"mirrors of {c} columns", lambda: _found(tiles, c, middle))
+
+
+def _found(tiles: Tiles, c: int, center: FloatArray) -> Mirrors:
+    from scipy.spatial import cKDTree
+
+    n, x = len(tiles.points), tiles.points - center
+    places, tree = Places.at(tiles.points, tiles.normals), cKDTree(x)
     flips: list[tuple[int, ...]] = []
     made: set[frozenset[int]] = {frozenset()}
     images, signs = np.arange(n)[None], np.ones((1, n, c))
-    for axes in () if boundary.varies else FLIPS:
+    for axes in FLIPS:
         if frozenset(axes) in made:
             continue
-        step = _image(nodes, root, x, axes, c)
+        step = _image(places, tiles.weights, tree, axes, c)
         if step is None:
             continue
         flips.append(axes)
@@ -113,34 +126,24 @@ def no_mirrors(nodes: int, columns: int) -> Mirrors:
 
 
 def _image(
-    nodes: Places, root: FloatArray, x: FloatArray, axes: tuple[int, ...], c: int
+    places: Places, weights: FloatArray, tree: Any, axes: tuple[int, ...], c: int
 ) -> tuple[IntArray, FloatArray] | None:
-    """Number of the image of each node (n,) by one flip, and signs of its tangents (n, c); None if there is none."""
-    from scipy.spatial import cKDTree
+    """Number of the image of each node (n,) by one flip, and signs of its tangents (n, c); None if there is none.
 
-    flip = np.ones(3)
+    ``tree`` holds the nodes about the centre.
+    """
+    x, flip = tree.data, np.ones(3)
     flip[list(axes)] = -1.0
-    size = float(np.max(np.abs(x)))
-    away, at = cKDTree(x).query(x * flip)
-    if np.max(away) > SAME * size or np.any(at[at] != np.arange(len(x))):
+    away, at = tree.query(x * flip, distance_upper_bound=SAME * float(np.max(np.abs(x))))
+    if not np.all(np.isfinite(away)) or np.any(at[at] != np.arange(len(x))):
         return None
-    if np.max(np.abs(root[at] / root - 1)) > SAME or np.max(np.abs(nodes.normals[at] - nodes.normals * flip)) > SAME:
+    off = np.max(np.abs(places.normals[at] - places.normals * flip))
+    if off > SAME or np.max(np.abs(np.sqrt(weights[at] / weights) - 1)) > SAME:
         return None
     if c == 1:
         return at, np.ones((len(x), 1))
-    signs = np.stack([np.sum(t[at] * t * flip, axis=1) for t in (nodes.a, nodes.b)], axis=1)
+    signs = np.stack([np.sum(t[at] * t * flip, axis=1) for t in (places.a, places.b)], axis=1)
     return (at, np.round(signs)) if np.max(np.abs(np.abs(signs) - 1)) < SAME else None
-
-
-class Blocks:
-    """All entries of a matrix in its blocks by parity, single precision: (2^s, m c, m c)."""
-
-    def __init__(self, matrix: Matrix, mirrors: Mirrors) -> None:
-        self.entries = blocks_of(matrix, mirrors)
-
-    def product(self, number: int, values: ComplexArray) -> ComplexArray:
-        """A block times columns (m c, p)."""
-        return np.asarray(self.entries[number] @ values.astype(np.complex64), dtype=complex)
 
 
 def blocks_of(matrix: Matrix, mirrors: Mirrors) -> np.ndarray:

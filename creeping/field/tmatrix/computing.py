@@ -167,7 +167,7 @@ def _computed(
     radius = float(np.max(np.linalg.norm(tiles.points - middle, axis=1)))
     degree = order_for(k * radius) if order is None else order
     matrix = Matrix(tiles, k, kind)
-    mirrors = mirrors_of(matrix.nodes, matrix.root, kind, middle)
+    mirrors = mirrors_of(tiles, kind, middle)
     plan = plan_for(load_on(tiles, FINER * k, kind), kind, degree, len(mirrors.images))
     what = f"the T-matrix of order {degree} at wavenumber {k:g} by {len(tiles.points)} nodes"
     _refuse(plan, what, seconds)

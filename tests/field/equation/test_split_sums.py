@@ -8,7 +8,7 @@ import scatterers as sc
 from creeping.field.boundary import CONDUCTOR, scalar_boundaries
 from creeping.field.equation.columns import SplitProduct
 from creeping.field.equation.matrix import Matrix
-from creeping.field.equation.mirrors import Blocks, no_mirrors
+from creeping.field.equation.mirrors import blocks_of, no_mirrors
 from creeping.field.equation.split_sums import CURL, ONE_LAYER, SPLITS, SmoothKernel, SplitSums, best_split
 from creeping.field.equation.tiles import tiles_for
 from creeping.geometry.covering import patches_of
@@ -113,8 +113,9 @@ def test_products_are_those_of_the_matrix(boundary, rng):
     tiles = tiles_for(patches_of(sc.Sphere() if boundary == "pec" else sc.Cylinder(0.5, 1.0)), k)
     matrix = Matrix(tiles, k, CONDUCTOR if len(kinds) == 2 else kinds[0])
     v = rng.normal(size=(len(matrix.root) * matrix.columns, 2)) + 1j * rng.normal(size=(1, 2))
-    whole = Blocks(matrix, no_mirrors(len(matrix.root), matrix.columns)).product(0, v)
-    assert rms(SplitProduct(matrix).product(0, v) - whole) < SPLIT * rms(whole - v)
+    (block,) = blocks_of(matrix, no_mirrors(len(matrix.root), matrix.columns))
+    whole = block @ v
+    assert rms(SplitProduct(matrix)(v) - whole) < SPLIT * rms(whole - v)
 
 
 def test_splitting_is_left_where_all_pairs_are_sooner_or_memory_is_short(rng, monkeypatch):
@@ -136,4 +137,4 @@ def test_a_thin_body_has_nothing_beneath_its_nodes(rng):
     matrix = Matrix(tiles_for(patches_of(sc.Sphere())[:1], 0.5), 0.5, CONDUCTOR)
     matrix.at, matrix.inner = matrix.at[:0], matrix.inner.part(slice(0, 0))
     values = rng.normal(size=(2 * len(matrix.root), 1)) + 0j
-    assert np.all(np.isfinite(SplitProduct(matrix).product(0, values)))
+    assert np.all(np.isfinite(SplitProduct(matrix)(values)))

@@ -11,11 +11,13 @@ import scatterers as sc
 from creeping.field.boundary import scalar_boundaries
 from creeping.field.equation.body_tiles import body_tiles
 from creeping.field.equation.currents import inside_points
+from creeping.field.equation.effort import equation_boundary
 from creeping.field.equation.matrix import Matrix
 from creeping.field.equation.mirrors import mirrors_of, no_mirrors
 from creeping.field.tmatrix import computing
 from creeping.field.tmatrix.solved_waves import SolvedWaves
 from creeping.field.tmatrix.spherical_waves import degrees, vector_degrees
+from tests.field.equation.test_mirrors import sheared
 
 RNG = np.random.default_rng(2)
 D, R = RNG.normal(size=(2, 6, 3))
@@ -102,7 +104,7 @@ def test_mirrors_change_nothing(body, times, boundary):
     kind = computing.CONDUCTOR if len(kinds) == 2 else kinds[0]
     tiles = body_tiles(body, k, kind)
     matrix = Matrix(tiles, k, kind)
-    planes = mirrors_of(matrix.nodes, matrix.root, kind, np.zeros(3))
+    planes = mirrors_of(tiles, kind, np.zeros(3))
     assert planes.flips == ((0,), (1,), (2,)) and len(planes.images) == 8 and set(planes.times) == times
     assert set(planes.images.ravel()) == set(range(len(tiles.points)))
     assert np.sum(8 / planes.times) == len(tiles.points)
@@ -113,6 +115,20 @@ def test_mirrors_change_nothing(body, times, boundary):
     left = [one.extinction(x) for one in both]
     # rounding is single, and at the edge of a conductor more is left
     assert left[0] == pytest.approx(left[1], rel=1e-2, abs=2e-5) and left[0] < 3e-3
+
+
+@pytest.mark.parametrize("boundary", ["hard", pytest.param("pec", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("shears", "flips"), [(((0, 1, 0.3),), ((2,), (0, 1))), (((0, 1, 0.3), (1, 2, 0.2), (2, 0, 0.1)), ((0, 1, 2),))]
+)
+def test_half_turns_and_the_inversion_change_nothing(shears, flips, boundary):
+    k, kind, body = 2.0, equation_boundary(boundary), sheared(*shears)
+    tiles = body_tiles(body, k, kind)
+    matrix, found = Matrix(tiles, k, kind), mirrors_of(tiles, kind, np.zeros(3))
+    assert found.flips == flips
+    none = no_mirrors(len(matrix.root), matrix.columns)
+    both = [SolvedWaves(matrix, np.zeros(3), 4, some, print, direct=True).T for some in (found, none)]
+    assert np.abs(both[0] - both[1]).max() < 2e-6
 
 
 def test_gmres_serves_where_the_matrix_is_too_large(monkeypatch):
