@@ -86,10 +86,11 @@ def far_field(
     order : 2 or 1
         Order of the creeping waves. Order 1, the leading order, uses sums over rays only.
     method : {"auto", "currents", "rays", "equation"}
-        "currents" radiates the currents of the whole body, "rays" sums over isolated rays. "auto" uses currents if
-        they take less than about ten seconds and the order is 2, else rays. Where expansions of the currents are known
-        to fail, it solves the integral equation (`creeping.surface_currents`). "equation" solves it wherever possible,
-        which takes minutes at high wavenumbers. For a body with edges the equation is that of `creeping.solve`;
+        "currents" radiates the currents of the whole body (of a body with edges, those of its integral equation),
+        "rays" sums over isolated rays. "auto" uses currents if they take less than about ten seconds and the order is
+        2, else rays. Where expansions of the currents are known to fail, it solves the integral equation
+        (`creeping.surface_currents`). "equation" solves it wherever possible, which takes minutes at high wavenumbers.
+        For a body with edges the equation is that of `creeping.solve`;
         "auto" allows it half a minute, and uses coarse tiles, with a larger error, if fine ones take longer. If the
         equation is not solved for a body with edges, or a conductor with joints or tips, the field is the sum of
         isolated rays and physical optics (`creeping.field.waves.piecewise_far`); ``method`` is then "rays+optics".

@@ -242,7 +242,9 @@ def far_currents(problem: Problem, directions: int) -> SurfaceCurrents | None:
     piecewise = is_piecewise(problem.body)
     serve = problem.has_expansions and (problem.order == 2 or not piecewise)
     auto = method == "auto" and problem.order == 2 and directions > 0
-    solved = solution_of_pieces(fan, k, boundary) if auto and piecewise else None
+    # currents of a body whose currents have no expansions are those of its equation
+    solve = auto or (method == "currents" and directions > 0 and not problem.has_expansions)
+    solved = solution_of_pieces(fan, k, boundary) if solve and piecewise else None
     if solved:
         return solved.currents
     # there are no modes of an admittance that varies

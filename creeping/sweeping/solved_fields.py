@@ -136,7 +136,7 @@ def fill_piecewise(
     rows = list(there)
     asked = list(product(request.problems, enumerate(request.wavenumbers)))
     # the equation is solved for all incidences at once, and these come before the next one
-    together = request.order == 2 and request.method in ("auto", "equation")
+    together = request.order == 2 and request.method in ("auto", "currents", "equation")
     jobs = [(row, one) for one in asked for row in rows] if together else [(r, one) for r in rows for one in asked]
     directions = np.array([line.direction for line in there.values()])
     fans: dict[int, RayFan] = {}
