@@ -3,6 +3,7 @@
 Lengths of the body are metres. Angles are those of the radar or the observer as seen from the body.
 """
 
+import time
 from typing import Annotated, Any
 
 from cyclopts import Parameter
@@ -40,6 +41,28 @@ def ts(
 
 
 def _run(quantity: str, body: str, echo: options.EchoOptions, file: options.FileOptions, **wave: Any) -> int:
-    from creeping.commands.echo_report import run_averages, run_echo
+    """Refuse what makes no sense before the body is read, and its size before libraries of fields are loaded."""
+    from creeping._progress import Progress
+    from creeping.commands.body import parse_body
+    from creeping.commands.echo_request import EchoJob, echo_request
+    from creeping.commands.forecast import size_words
 
-    return (run_averages if echo.average else run_echo)(quantity, body, echo, file, **wave)
+    started = time.perf_counter()
+    asked: dict[str, Any] = {"frequency": echo.frequency, "wavelength": echo.wavelength, **wave}
+    asked |= {"monostatic": echo.monostatic, "bistatic": echo.bistatic, "incidence": echo.incidence}
+    request = echo_request(quantity, **asked)
+    job = EchoJob(body, echo, file, asked, request, started)
+    job.check()
+    if echo.compare:
+        from creeping.commands.echo_report import reference_of
+
+        # before the body is read, which may take minutes
+        reference_of(request, echo.compare, echo.column, echo.align)
+    with Progress("frequencies" if echo.average else "", quiet=echo.json_) as progress:
+        shape = parse_body(body, options=file, cache=echo.cache, progress=progress)
+        size_words(shape, request.wavenumbers, metres=True, cure=request.cure)
+        from creeping.commands.echo_report import run_averages, run_echo
+
+        told = (run_averages if echo.average else run_echo)(job, shape, progress)
+    print(told)
+    return 0

@@ -1,7 +1,6 @@
 """What ``creeping rcs`` and ``creeping ts`` compute, write and say: echoes, and means over all orientations."""
 
 import json
-import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -14,10 +13,9 @@ from creeping import plotting
 from creeping._progress import Progress
 from creeping._typing import FloatArray
 from creeping._version import __version__
-from creeping.commands.body import each_once, parse_body
-from creeping.commands.echo_request import EchoRequest, echo_request, radians_hint
+from creeping.commands.body import each_once
+from creeping.commands.echo_request import EchoJob, EchoRequest
 from creeping.commands.forecast import boundary_words, forecast
-from creeping.commands.options import EchoOptions, FileOptions
 from creeping.commands.resuming import SUMMARY, asked_for, begun, kept
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import parse_boundary
@@ -38,80 +36,70 @@ from creeping.sweeping.echoes import backscatter, bistatic, echo_of, monostatic_
 from creeping.sweeping.over_wavenumbers import averages_of, t_matrices
 
 
-def run_echo(quantity: str, body: str, given: EchoOptions, file: FileOptions, **wave: Any) -> int:
-    """Compute, write and tell an echo; ``wave`` has the speed of sound, polarisations and boundary."""
-    started, method, output = time.perf_counter(), given.method, given.output or Path(quantity)
-    asked: dict[str, Any] = {"frequency": given.frequency, "wavelength": given.wavelength, **wave}
-    asked |= {"monostatic": given.monostatic, "bistatic": given.bistatic, "incidence": given.incidence}
-    request = echo_request(quantity, **asked)
-    for name in ("monostatic", "bistatic", "incidence"):
-        if hint := radians_hint(f"--{name}", asked[name]):
-            print(f"creeping: {hint}", file=sys.stderr)
+def run_echo(job: EchoJob, shape: Any, progress: Progress) -> str:
+    """Compute and write an echo: what there is to say of it."""
+    request, given, body = job.request, job.given, job.body
+    method, output, quantity = given.method, given.output or Path(request.quantity), request.quantity
     boundary, mono, k = parse_boundary(request.boundary), request.monostatic, request.wavenumbers
-    words = asked | {"method": method} | file.given() | {"pictures": given.pictures, "formats": given.formats}
+    words = job.asked | {"method": method} | job.file.given() | {"pictures": given.pictures, "formats": given.formats}
     words |= {"compare": given.compare, "column": given.column, "align": given.align}
     formats = each_once("--format", given.formats, ("csv", "mat"))
-    # before the time is spent
     reference = reference_of(request, given.compare, given.column, given.align)
-    with Progress(quiet=given.json_) as progress:
-        shape = parse_body(body, options=file, cache=given.cache, progress=progress)
-        azimuths, elevations = request.angles(shape)
-        count = len(azimuths)
-        if method == "auto" and mono:
-            method = monostatic_method(shape, k, boundary, count)
-        radar, observers = ((azimuths, elevations), 1) if mono else (request.incidence, count)
-        seen: dict[str, Any] = {"radar": radar, "observers": observers, "metres": True, "cure": request.cure}
-        told = forecast(shape, k, boundary, method=method, **seen)
-        progress.note(f"{told.body}, {boundary_words(boundary)}")
-        unfinished = begun(output, quantity, asked_for(body, shape, **words), resume=given.resume)
-        if unfinished is None:
-            print((output / SUMMARY).read_text() if given.json_ else f"nothing is missing in {output}")
-            return 0
-        frequencies = f"{len(k)} frequenc{'ies' if len(k) > 1 else 'y'}"
-        progress(f"{count} angle{'s' * (count > 1)} x {frequencies} by {told.by}")
-        values = count * len(k)
-        progress.begin(0, values)
+    azimuths, elevations = request.angles(shape)
+    count = len(azimuths)
+    if method == "auto" and mono:
+        method = monostatic_method(shape, k, boundary, count)
+    radar, observers = ((azimuths, elevations), 1) if mono else (request.incidence, count)
+    seen: dict[str, Any] = {"radar": radar, "observers": observers, "metres": True, "cure": request.cure}
+    told = forecast(shape, k, boundary, method=method, **seen)
+    progress.note(f"{told.body}, {boundary_words(boundary)}")
+    unfinished = begun(output, quantity, asked_for(body, shape, **words), resume=given.resume)
+    if unfinished is None:
+        return (output / SUMMARY).read_text() if given.json_ else f"nothing is missing in {output}"
+    frequencies = f"{len(k)} frequenc{'ies' if len(k) > 1 else 'y'}"
+    progress(f"{count} angle{'s' * (count > 1)} x {frequencies} by {told.by}")
+    values = count * len(k)
+    progress.begin(0, values)
 
-        def echo_for(dataset: Any) -> Echo:
-            return echo_of(dataset, quantity, request.channels, request.angle_name, sound_speed=request.sound_speed)
+    def echo_for(dataset: Any) -> Echo:
+        return echo_of(dataset, quantity, request.channels, request.angle_name, sound_speed=request.sound_speed)
 
-        def rows(found: Rows) -> None:
-            """Write the rows that are there, with marks that others are missing."""
-            done = int(found.known.sum())
-            mark = f"incomplete: {done} of {values} values; {unfinished.mark}"
-            table = output / f"{quantity}.csv"
-            write_echo(table, echo_for(found.dataset), known=found.known, mark=mark)
-            missing = {
-                "values_done": done,
-                "values": values,
-                "resume": unfinished.again,
-                "files": [table.name, SUMMARY],
-            }
-            unfinished.write_summary(missing, complete=False)
+    def rows(found: Rows) -> None:
+        """Write the rows that are there, with marks that others are missing."""
+        done = int(found.known.sum())
+        mark = f"incomplete: {done} of {values} values; {unfinished.mark}"
+        table = output / f"{quantity}.csv"
+        write_echo(table, echo_for(found.dataset), known=found.known, mark=mark)
+        missing = {
+            "values_done": done,
+            "values": values,
+            "resume": unfinished.again,
+            "files": [table.name, SUMMARY],
+        }
+        unfinished.write_summary(missing, complete=False)
 
-        def passed(done: float, total: int, seconds: float) -> None:
-            progress.told(values * done / total, values, seconds)
+    def passed(done: float, total: int, seconds: float) -> None:
+        progress.told(values * done / total, values, seconds)
 
-        with kept(unfinished, progress.message):
-            job: dict[str, Any] = {"wavenumbers": k, "azimuth": azimuths, "elevation": elevations, "boundary": boundary}
-            job |= {"cache": given.cache, "progress": passed, "store": unfinished.parts, "resume": True, "rows": rows}
-            if mono:
-                dataset = backscatter(shape, method=method, **job)
-            else:
-                # one fan for all observers: currents cost no more than rays
-                method = "currents" if method == "auto" else method
-                dataset = bistatic(shape, incidence=request.incidence, method=method, **job)
-            echo = echo_for(dataset)
-            progress("tables and pictures" if given.pictures else "tables")
-            comparisons, refused = compared(echo, reference, given.align)
-            pictured: dict[str, Any] = {"pictures": given.pictures, "formats": formats}
-            names, extra = write_results(output, echo, comparisons, shape, body, **pictured)
-            summary = summary_of(body, request, echo, dataset) | extra | refused
-            summary["files"] = [*names, SUMMARY]
-            unfinished.write_summary(summary, complete=True)
-    summary |= {"complete": True, "seconds": round(time.perf_counter() - started, 2)}
-    print(json.dumps(summary, indent=1) if given.json_ else readable(summary, output))
-    return 0
+    with kept(unfinished, progress.message):
+        asked: dict[str, Any] = {"wavenumbers": k, "azimuth": azimuths, "elevation": elevations, "boundary": boundary}
+        asked |= {"cache": given.cache, "progress": passed, "store": unfinished.parts, "resume": True, "rows": rows}
+        if mono:
+            dataset = backscatter(shape, method=method, **asked)
+        else:
+            # one fan for all observers: currents cost no more than rays
+            method = "currents" if method == "auto" else method
+            dataset = bistatic(shape, incidence=request.incidence, method=method, **asked)
+        echo = echo_for(dataset)
+        progress("tables and pictures" if given.pictures else "tables")
+        comparisons, refused = compared(echo, reference, given.align)
+        pictured: dict[str, Any] = {"pictures": given.pictures, "formats": formats}
+        names, extra = write_results(output, echo, comparisons, shape, body, **pictured)
+        summary = summary_of(body, request, echo, dataset) | extra | refused
+        summary["files"] = [*names, SUMMARY]
+        unfinished.write_summary(summary, complete=True)
+    summary |= {"complete": True, "seconds": round(time.perf_counter() - job.started, 2)}
+    return json.dumps(summary, indent=1) if given.json_ else readable(summary, output)
 
 
 def reference_of(
@@ -125,9 +113,6 @@ def reference_of(
         If the file is no table, lacks the columns, or is over what the request does not vary.
     """
     if path is None:
-        stray = [name for name, value in (("--column", column), ("--align", align)) if value]
-        if stray:
-            raise InvalidInputError(f"{' and '.join(stray)}: give --compare as well, what it is about")
         return {}
     if not (np.isfinite(align) and align >= 0):
         raise InvalidInputError(f"--align {align!r} is not a finite number of degrees >= 0")
@@ -340,76 +325,61 @@ def readable(summary: dict[str, Any], output: Path) -> str:
     return "\n".join(rows)
 
 
-def run_averages(quantity: str, body: str, given: EchoOptions, file: FileOptions, **wave: Any) -> int:
-    """Compute, write and tell means over orientation; ``wave`` as of `run_echo`."""
-    started, output = time.perf_counter(), given.output or Path(quantity)
-    stray = [
-        f"--{name}"
-        for name in ("monostatic", "bistatic", "incidence", "compare", "column", "align")
-        if getattr(given, name)
-    ]
-    stray += ["--polarisation"] * bool(wave["polarisation"])
-    stray += ["--method"] * (given.method not in ("auto", "t-matrix"))
-    if stray:
-        raise InvalidInputError(f"--average is over all angles and polarisations: leave out {', '.join(stray)}")
-    each_once("--format", given.formats, ("csv",))
-    asked: dict[str, Any] = {"frequency": given.frequency, "wavelength": given.wavelength, **wave}
-    request = echo_request(quantity, monostatic=None, bistatic=None, incidence=None, **asked)
+def run_averages(job: EchoJob, shape: Any, progress: Progress) -> str:
+    """Compute and write means over orientation: what there is to say of them."""
+    request, given, body = job.request, job.given, job.body
+    output, quantity = given.output or Path(request.quantity), request.quantity
     boundary, k = parse_boundary(request.boundary), request.wavenumbers
     hertz = np.array([float(f"{one:.14g}") for one in np.atleast_1d(frequency(k, sound_speed=request.sound_speed))])
-    words = asked | {"average": True} | file.given() | {"pictures": given.pictures}
-    with Progress("frequencies", quiet=given.json_) as progress:
-        shape = parse_body(body, options=file, cache=given.cache, progress=progress)
-        told = forecast(shape, k, boundary, method="t-matrix", metres=True, cure=request.cure)
-        progress.note(f"{told.body}, {boundary_words(boundary)}")
-        unfinished = begun(output, quantity, asked_for(body, shape, **words), resume=given.resume)
-        if unfinished is None:
-            print((output / SUMMARY).read_text() if given.json_ else f"nothing is missing in {output}")
-            return 0
-        progress(f"the mean over all orientations at {len(k)} frequenc{'ies' if len(k) > 1 else 'y'} by {told.by}")
-        progress.begin(0, len(k))
-        table, rows = output / f"{quantity}_average.csv", list[tuple[float, Averages]]()
+    words = job.asked | {"average": True} | job.file.given() | {"pictures": given.pictures}
+    told = forecast(shape, k, boundary, method="t-matrix", metres=True, cure=request.cure)
+    progress.note(f"{told.body}, {boundary_words(boundary)}")
+    unfinished = begun(output, quantity, asked_for(body, shape, **words), resume=given.resume)
+    if unfinished is None:
+        return (output / SUMMARY).read_text() if given.json_ else f"nothing is missing in {output}"
+    progress(f"the mean over all orientations at {len(k)} frequenc{'ies' if len(k) > 1 else 'y'} by {told.by}")
+    progress.begin(0, len(k))
+    table, rows = output / f"{quantity}_average.csv", list[tuple[float, Averages]]()
 
-        def write(mark: str = "") -> Any:
-            found = averages_of(shape, boundary, rows)
-            write_averages(table, quantity, hertz[: len(rows)], found, mark=mark)
-            return found
+    def write(mark: str = "") -> Any:
+        found = averages_of(shape, boundary, rows)
+        write_averages(table, quantity, hertz[: len(rows)], found, mark=mark)
+        return found
 
-        def incomplete() -> None:
-            write(f"incomplete: {len(rows)} of {len(k)} frequencies; {unfinished.mark}")
-            missing = {"values_done": len(rows), "values": len(k), "resume": unfinished.again}
-            unfinished.write_summary(missing | {"files": [table.name, SUMMARY]}, complete=False)
+    def incomplete() -> None:
+        write(f"incomplete: {len(rows)} of {len(k)} frequencies; {unfinished.mark}")
+        missing = {"values_done": len(rows), "values": len(k), "resume": unfinished.again}
+        unfinished.write_summary(missing | {"files": [table.name, SUMMARY]}, complete=False)
 
-        with kept(unfinished, progress.message):
-            for T in t_matrices(shape, wavenumbers=k, boundary=boundary, store=unfinished.parts):
-                rows.append((T.wavenumber, T.orientation_average()))
-                progress.told(len(rows), len(k))
-                if len(rows) < len(k):
-                    unfinished.now_and_then(incomplete)
-            found = write()
-            levels, error = averaged_levels(quantity, found), found.target_strength_error.values
-            names = [table.name]
-            if given.pictures and len(k) > 1:
-                title = f"{body if len(body) < 50 else f'{body[:47]}...'}, mean over all orientations"
-                picture = output / f"{quantity}_average.png"
-                plotting.averages_picture(picture, quantity, hertz, levels, error, title=title)
-                names.append(picture.name)
-            summary = {
-                "body": body,
-                "version": __version__,
-                "quantity": f"{quantity}, mean over orientation",
-                "unit": LEVELS[quantity][1],
-                "boundary": request.boundary,
-                "values": len(k),
-                "frequency_hz": [float(hertz[0]), float(hertz[-1])],
-                "range": [float(levels.min()), float(levels.max())],
-                "error_db": float(error.max()),
-                "files": [*names, SUMMARY],
-            }
-            unfinished.write_summary(summary, complete=True)
-    summary |= {"complete": True, "seconds": round(time.perf_counter() - started, 2)}
-    print(json.dumps(summary, indent=1) if given.json_ else _readable_averages(summary, output))
-    return 0
+    with kept(unfinished, progress.message):
+        for T in t_matrices(shape, wavenumbers=k, boundary=boundary, store=unfinished.parts):
+            rows.append((T.wavenumber, T.orientation_average()))
+            progress.told(len(rows), len(k))
+            if len(rows) < len(k):
+                unfinished.now_and_then(incomplete)
+        found = write()
+        levels, error = averaged_levels(quantity, found), found.target_strength_error.values
+        names = [table.name]
+        if given.pictures and len(k) > 1:
+            title = f"{body if len(body) < 50 else f'{body[:47]}...'}, mean over all orientations"
+            picture = output / f"{quantity}_average.png"
+            plotting.averages_picture(picture, quantity, hertz, levels, error, title=title)
+            names.append(picture.name)
+        summary = {
+            "body": body,
+            "version": __version__,
+            "quantity": f"{quantity}, mean over orientation",
+            "unit": LEVELS[quantity][1],
+            "boundary": request.boundary,
+            "values": len(k),
+            "frequency_hz": [float(hertz[0]), float(hertz[-1])],
+            "range": [float(levels.min()), float(levels.max())],
+            "error_db": float(error.max()),
+            "files": [*names, SUMMARY],
+        }
+        unfinished.write_summary(summary, complete=True)
+    summary |= {"complete": True, "seconds": round(time.perf_counter() - job.started, 2)}
+    return json.dumps(summary, indent=1) if given.json_ else _readable_averages(summary, output)
 
 
 def _readable_averages(summary: dict[str, Any], output: Path) -> str:

@@ -1,6 +1,7 @@
 """What ``creeping rcs`` and ``creeping ts`` ask for: angles, frequencies, polarisations. Degrees, hertz, metres."""
 
 import re
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,13 +11,13 @@ import numpy as np
 from creeping._typing import FloatArray
 from creeping.commands.body import each_once
 from creeping.commands.forecast import cure_of, size_words
+from creeping.commands.options import EchoOptions, FileOptions
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import boundary_name, parse_boundary
 from creeping.field.frequency import frequency as frequency_of
 from creeping.field.frequency import is_length, wavenumber
-from creeping.field.waves.forward import lobe_step
+from creeping.field.results.labelled import POLARISATIONS
 from creeping.geometry.surface import Surface
-from creeping.sweeping.results import POLARISATIONS
 
 AXES = {"az": "azimuth", "el": "elevation"}
 MOST = 200_000
@@ -73,6 +74,8 @@ class EchoRequest:
         """
         if not self.angle_name:
             return np.array([self.place[0]]), np.array([self.place[1]])
+        from creeping.field.waves.forward import lobe_step
+
         step = self.step or lobe_step(body, float(self.wavenumbers.max()), monostatic=self.monostatic)
         count = (self.span[1] - self.span[0]) / step
         if count > MOST:
@@ -146,6 +149,40 @@ def echo_request(
         step=step,
         cure=cure_of(option, text, float(frequency_of(numbers.max(), sound_speed=sound_speed))),
     )
+
+
+@dataclass(frozen=True)
+class EchoJob:
+    """A request, and what was typed: the body's text, options, what the wave was ``asked`` as; and when it began."""
+
+    body: str
+    given: EchoOptions
+    file: FileOptions
+    asked: dict[str, Any]
+    request: EchoRequest
+    started: float
+
+    def check(self) -> None:
+        """Refuse options that do not go together, and ask about angles that look like radians.
+
+        Raises
+        ------
+        InvalidInputError
+        """
+        given = self.given
+        each_once("--format", given.formats, ("csv",) if given.average else ("csv", "mat"))
+        if given.average:
+            names = ("monostatic", "bistatic", "incidence", "compare", "column", "align")
+            stray = [f"--{name}" for name in names if getattr(given, name)]
+            stray += ["--polarisation"] * bool(self.asked["polarisation"])
+            stray += ["--method"] * (given.method not in ("auto", "t-matrix"))
+            if stray:
+                raise InvalidInputError(f"--average is over all angles and polarisations: leave out {', '.join(stray)}")
+        elif given.compare is None and (stray := [f"--{name}" for name in ("column", "align") if getattr(given, name)]):
+            raise InvalidInputError(f"{' and '.join(stray)}: give --compare as well, what it is about")
+        for name in ("monostatic", "bistatic", "incidence"):
+            if hint := radians_hint(f"--{name}", self.asked[name]):
+                print(f"creeping: {hint}", file=sys.stderr)
 
 
 def _pair(option: str, text: str, angles: Sequence[float]) -> tuple[float, float]:

@@ -1,4 +1,7 @@
-"""The wave of a command, and what a field will be made by, how long that takes and how far it errs, told before."""
+"""The wave of a command, and what a field will be made by, how long that takes and how far it errs, told before.
+
+Libraries of fields are loaded when a forecast is asked for: requests that make no sense are refused before.
+"""
 
 from typing import Any, NamedTuple
 
@@ -8,18 +11,14 @@ from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.arguments import checked, checked_across
 from creeping.field.boundary import BoundaryLike, boundary_name
-from creeping.field.equation.effort import ASKED, plan_of
 from creeping.field.frequency import frequency as hertz_of
 from creeping.field.frequency import suited
 from creeping.field.frequency import wavenumber as wavenumber_of
-from creeping.field.tmatrix.computing import expected
-from creeping.field.validity_range import is_reached
 from creeping.geodesics.equations import points_of_charts
 from creeping.geometry.checks import unit_of
 from creeping.geometry.directions import azimuth_elevation_of
 from creeping.geometry.parts import why_no_rays
 from creeping.geometry.piecewise import has_edges, is_piecewise
-from creeping.sweeping.echoes import seconds_of_currents
 
 SOLVED = "errors of 0.01 to 1 % of the largest amplitude (0.1 dB)"
 COARSE = "errors of 0.1 to 3 % of the largest amplitude (0.3 dB), for want of time: coarse tiles and few steps"
@@ -109,6 +108,10 @@ def forecast(
     ``radar``: azimuths and elevations (n,), degrees, of the incidences of a backscatter cut, or of one incidence with
     several ``observers``. Without it the equation's cost is that of one incidence, and none is told of rays.
     """
+    from creeping.field.equation.effort import ASKED, plan_of
+    from creeping.field.tmatrix.computing import expected
+    from creeping.field.validity_range import is_reached
+
     k = np.atleast_1d(np.asarray(wavenumbers, dtype=float))
     without, pieces = why_no_rays(shape), is_piecewise(shape)
     kind = without or (f"in smooth pieces with {len(shape.creases)} creases" if pieces else "one smooth surface")
@@ -156,12 +159,16 @@ def _cost(
     """What currents may take where they must serve all, hundreds of times as slowly as rays."""
     if radar is None:
         return ""
+    from creeping.sweeping.echoes import seconds_of_currents
+
     seconds = seconds_of_currents(shape, k, *radar, observers=observers, boundary=boundary)
     return f"up to about {duration(seconds)} if currents serve all, " if seconds else ""
 
 
 def _errors(shape: Any, k: FloatArray) -> str:
     """How far rays and currents err, by the lowest wavenumber."""
+    from creeping.field.validity_range import is_reached
+
     if why_no_rays(shape) or has_edges(shape):
         return "errors of several per cent of the largest amplitude (0.5 dB)"
     if is_reached(shape, float(k.min())):

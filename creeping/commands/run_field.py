@@ -20,6 +20,7 @@ from creeping.field.equation.solving import solved_alone
 from creeping.field.far import far_field_uncertainty, far_in_parts
 from creeping.field.results.comparison import cross_section_decibels
 from creeping.field.results.far_result import FarField, turned_to_azimuth
+from creeping.field.results.labelled import POLARISATIONS
 from creeping.field.validity_range import validity
 from creeping.field.waves.forward import lobe_step
 from creeping.files.ffe import grid_directions
@@ -34,8 +35,6 @@ DPI = 200
 """Of pictures."""
 MOST = 200_000
 """Directions of one run."""
-POLARISATIONS = {"VV": "tt", "VH": "tp", "HV": "pt", "HH": "pp"}
-"""Received and transmitted, V along theta and H along phi, and the names of the components in pictures."""
 
 
 @dataclass(frozen=True)
@@ -334,7 +333,8 @@ def job(
     if polarisation is not None and kind != "pec":
         raise InvalidInputError("--polarisation is of a conductor; give it with --boundary pec")
     shown = each_once("--polarisation", polarisation or "VV,HH", POLARISATIONS)
-    components = tuple(POLARISATIONS[name] for name in shown)
+    # as pictures name them: tt, tp
+    components = tuple("".join(along[0] for along in POLARISATIONS[name]) for name in shown)
     found = Job(k, kind, targets, unit, hertz, components, cure)
     found.check_count()
     return found

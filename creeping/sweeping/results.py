@@ -14,7 +14,7 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping._version import __version__
-from creeping.field.results.labelled import COMPONENTS, power
+from creeping.field.results.labelled import COMPONENTS, POLARISATIONS, power
 from creeping.geometry.checks import UNKNOWN, unit_of
 from creeping.geometry.directions import angles_of
 from creeping.geometry.piecewise import is_piecewise
@@ -39,8 +39,6 @@ CONVENTIONS = (
     "time factor exp(-i omega t); direction is where the wave travels; radians; lengths in the unit L of the body, "
     "wavenumbers in 1/L; far field f exp(i k r)/r, f in L"
 )
-POLARISATIONS = {"VV": ("theta", "theta"), "VH": ("theta", "phi"), "HV": ("phi", "theta"), "HH": ("phi", "phi")}
-"""Scattered by incident component: V is along theta, vertical where z is up and the wave level, H along phi."""
 
 
 Coordinate = tuple[tuple[str, ...], np.ndarray[Any, Any], dict[str, Any]]

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 COMPONENTS = ("theta", "phi")
 """Components of an incident and a scattered wave of a conductor, along the unit vectors of the angles."""
+POLARISATIONS = {"VV": ("theta", "theta"), "VH": ("theta", "phi"), "HV": ("phi", "theta"), "HH": ("phi", "phi")}
+"""Scattered by incident component: V is along theta, vertical where z is up and the wave level, H along phi."""
 
 
 def power(unit: str, exponent: int) -> str:

@@ -24,7 +24,6 @@ from math import factorial
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 from scipy.special import airy, wofz
 
 from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
@@ -273,6 +272,9 @@ def _by_series(which: str, xi: FloatArray, q: ComplexArray | None, power: int) -
 @cache
 def _tables(which: str, q: complex | None, power: int) -> tuple[Any, Any]:
     """Splines of one boundary: of the function between LIT and SERIES, and of its slow factor on the lit side."""
+    # not before it is needed: it takes half a second to load
+    from scipy.interpolate import make_interp_spline
+
     xi = np.linspace(LIT, SERIES, 301)
     inverse = np.linspace(1 / LIT, 1 / FARTHEST, 201)
     values = [None if q is None else np.full(len(x), q) for x in (xi, inverse)]
