@@ -235,7 +235,7 @@ def _atlas_checks(body: Surface, points: FloatArray) -> list[Check]:
 
 
 def _differences(function: Callable[[FloatArray], FloatArray], at: FloatArray, step: float) -> FloatArray:
-    """Derivatives (n, ..., c) of a function of (n, c): central differences of order 4, as fits of noise have ripples."""
+    """Derivatives (n, ..., c) of a function of (n, c): central ones of order 4, as fits of noise have ripples."""
     found = []
     for shift in step * np.eye(at.shape[1]):
         near, far = (function(at + many * shift) - function(at - many * shift) for many in (1, 2))
