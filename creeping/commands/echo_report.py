@@ -210,8 +210,8 @@ def _profiles(echo: Echo) -> dict[str, RangeProfile]:
         return {}
     try:
         return {
-            channel: range_profile(values[0], echo.wavenumbers)
-            for channel, values in zip(echo.channels, echo.total, strict=True)
+            channel: range_profile(values[0], echo.wavenumbers, error=error[0])
+            for channel, values, error in zip(echo.channels, echo.total, echo.error, strict=True)
         }
     except InvalidInputError:
         return {}
@@ -246,8 +246,7 @@ def _title(echo: Echo, name: str) -> str:
     at = f"{hertz[0] / 1e9:g} GHz" if echo.quantity == "rcs" else f"{hertz[0] / 1e3:g} kHz"
     words = [short, "" if len(hertz) > 1 else at]
     if echo.incidence is not None:
-        viewer = "radar" if echo.quantity == "rcs" else "sonar"
-        words.append(f"bistatic, {viewer} at azimuth {echo.incidence[0]:g}°, elevation {echo.incidence[1]:g}°")
+        words.append(f"bistatic, {echo.viewer} at azimuth {echo.incidence[0]:g}°, elevation {echo.incidence[1]:g}°")
     elif len(echo.azimuth) == 1:
         words.append(f"azimuth {echo.azimuth[0]:g}°, elevation {echo.elevation[0]:g}°")
     off = echo.summary()["error_db_median"]

@@ -345,11 +345,14 @@ def write_profile(path: str | os.PathLike[str], profiles: "dict[str, RangeProfil
     """
     found = profiles.values()
     values = joined(one.values for one in found)
-    place = "along the line of sight, 0 at the origin, negative towards the radar"
+    bounds = echo.levels(np.array([one.error for one in found]))
+    place = f"along the line of sight, 0 at the origin, negative towards the {echo.viewer}"
+    counts = [len(one.range) for one in found]
     columns: list[Column] = [
-        ("channel", "", np.repeat(list(profiles), [len(one.range) for one in found])),
+        ("channel", "", np.repeat(list(profiles), counts)),
         ("range_m", place, joined(one.range for one in found)),
         ("level_db", "of the echo from there", echo.levels(values)),
+        ("error_db", "bound of the error of its amplitude, as a level", np.repeat(bounds, counts)),
         ("phase_deg", "", np.degrees(np.angle(values))),
     ]
     _write_table(path, columns)

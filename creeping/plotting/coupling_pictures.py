@@ -164,7 +164,10 @@ def plot_coupling(
     if names:
         ax.set_xticks(range(count), names, rotation=45 if max(map(len, names)) > 4 else 0)
         ax.set_yticks(range(count), names)
-    return pages.finished(ax, fresh, pages.wave_title(found, found.length_unit), legend)
+    good = found.ok & (np.abs(found.values) > 0)
+    share = np.median(found.error[good] / np.abs(found.values[good])) if good.any() else np.nan
+    told = f", error {20 * np.log10(1 + share):.2g} dB in the median" if np.isfinite(share) else ""
+    return pages.finished(ax, fresh, pages.wave_title(found, found.length_unit) + told, legend)
 
 
 def plot_coupling_band(

@@ -169,7 +169,10 @@ def range_picture(
         low, high = shown_range(curves.values(), SPAN)
         # the legend lists what was drawn last first
         for number, (channel, found) in reversed(list(enumerate(profiles.items()))):
-            ax.plot(found.range, np.maximum(curves[channel], low - 1), label=channel, **pages.curve_style(number))
+            style = pages.curve_style(number)
+            if 0 < found.error < np.inf:
+                _draw_bound(ax, float(echo.levels(np.array(found.error))), style["color"], first=not number)
+            ax.plot(found.range, np.maximum(curves[channel], low - 1), label=channel, **style)
         strongest = max(profiles.values(), key=lambda found: float(np.max(np.abs(found.values))))
         alone = np.abs(range_profile(np.ones(len(echo.wavenumbers)), echo.wavenumbers).values)
         size = np.abs(strongest.values)
@@ -184,8 +187,7 @@ def range_picture(
         reach = next(iter(profiles.values())).range
         ax.set_xlim(max(span[0], reach[0]), min(span[1], reach[-1]))
         ax.set_ylim(low, high)
-        viewer = "radar" if echo.quantity == "rcs" else "sonar"
-        pages.dressed(ax, f"range along the line of sight (m), away from the {viewer}", _level(echo))
+        pages.dressed(ax, f"range along the line of sight (m), away from the {echo.viewer}", _level(echo))
         pages.finished(ax, True, title)
 
 
@@ -305,10 +307,9 @@ def plot_impulse(
         name = f"response {number}" if several else "envelope"
         style = pages.curve_style(number)
         curve = np.maximum(levels[:, number], heights[0] - (heights[1] - heights[0]))
-        if bounds[number] > 0:
+        if 0 < bounds[number] < np.inf:
             colour = style["color"] if several else pages.GREY
-            label = "_bound" if several and number else "error at most"
-            ax.axhline(float(decibels(bounds[number])), color=colour, linewidth=0.9, linestyle=":", label=label)
+            _draw_bound(ax, float(decibels(bounds[number])), colour, first=not (several and number))
         ax.plot(found.delay / scale, curve, label=name, **style)
     ax.set_xlim(low / scale, high / scale)
     ax.set_ylim(*heights)
@@ -337,6 +338,8 @@ def plot_profile(
     heights = shown_range([levels[(found.range >= low) & (found.range <= high)]], span)
     fresh, ax = pages.axes_or_new(ax, pages.PAGE)
     floor = heights[0] - (heights[1] - heights[0])
+    if 0 < found.error < np.inf:
+        _draw_bound(ax, float(decibels(np.array(found.error))), pages.GREY, first=True)
     ax.plot(found.range, np.maximum(levels, floor), label="profile", **pages.curve_style(0))
     ax.set_xlim(low, high)
     ax.set_ylim(*heights)
@@ -345,6 +348,11 @@ def plot_profile(
     # one curve has a legend only where it is asked for, and inside
     pages.add_legend(ax, False, legend)
     return ax
+
+
+def _draw_bound(ax: Any, level: float, colour: str, *, first: bool) -> None:
+    """A dotted line at the bound of an error; the first of several has the label."""
+    ax.axhline(level, color=colour, linewidth=0.9, linestyle=":", label="error at most" if first else "_bound")
 
 
 def _ends(values: FloatArray, start: float | None, end: float | None) -> tuple[float, float]:

@@ -121,6 +121,11 @@ class Echo(Drawn, Tabled):
         return np.array([float(f"{value:.14g}") for value in found])
 
     @property
+    def viewer(self) -> str:
+        """What sees the body: "radar" or "sonar"."""
+        return "radar" if self.quantity == "rcs" else "sonar"
+
+    @property
     def level_name(self) -> tuple[str, str]:
         """Name of the level, e.g. "radar cross section", and its unit."""
         return LEVELS[self.quantity]

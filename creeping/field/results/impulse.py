@@ -170,17 +170,11 @@ def impulse_response(
     >>> found.arrivals(1).round(1).tolist(), bool(found.error < 0.1)
     ([1.5], True)
     """
+    off = error
     if isinstance(values, Sequence) and len(values) and isinstance(values[0], ArrayResult):
         u, off = _of_results(values, error)
     else:
         u = np.asarray(values, dtype=complex)
-        off = np.zeros(u.shape) if error is None else np.asarray(error, dtype=float)
-    bad = ~(np.isfinite(off) & (off >= 0))
-    if off.shape != u.shape or np.any(bad):
-        raise InvalidInputError(
-            f"error has shape {off.shape}, {int(bad.sum())} of it not finite or negative; give one of 0 or more "
-            f"for each of the values {u.shape}"
-        )
     c = 1.0 if speed is None else positive_number(speed, "speed")
     first = None if start is None else c * number_between(start, "start", -1e100, 1e100)
     found = band_sum(u, wavenumbers, window=window, what="an impulse response", start=first)
@@ -188,11 +182,25 @@ def impulse_response(
     return ImpulseResponse(
         delay=found.delay / c,
         values=found.values,
-        error=np.asarray(np.tensordot(found.weights, off, axes=1)),
+        error=_bound(found.weights, off, u.shape),
         resolution=found.resolution / c,
         period=float(found.delay[1] - found.delay[0]) * count / c,
         unit="L" if speed is None else "s",
     )
+
+
+def _bound(weights: FloatArray, error: ArrayLike | None, shape: tuple[int, ...]) -> FloatArray:
+    """Bound of the error of a sum over a band with weights (n,) of sum 1, from errors of the values; 0 without them."""
+    off = np.zeros(shape) if error is None else np.asarray(error, dtype=float)
+    # written so that NaN fails
+    bad = ~(off >= 0)
+    if off.shape != shape or np.any(bad):
+        raise InvalidInputError(
+            f"error has shape {off.shape}, {int(bad.sum())} of it no number or negative; give one of 0 or more "
+            f"for each of the values {shape}"
+        )
+    unknown = np.any(np.isinf(off), axis=0)
+    return np.where(unknown, np.inf, np.tensordot(weights, np.where(np.isinf(off), 0.0, off), axes=1))
 
 
 def _of_results(results: Sequence[Any], error: ArrayLike | None) -> tuple[ComplexArray, FloatArray]:
@@ -215,6 +223,8 @@ class RangeProfile(Drawn):
         Ascending; distance R along d of the plane d.x = R, 0 at the origin.
     values : (m,) complex, L
         An isolated echo of amplitude f has this value at its range.
+    error : float, L
+        Bound of the error at any range, from the errors of the field; 0 if none were given.
     resolution : float, L
         Width of the peak of a single echo at half its power.
 
@@ -228,17 +238,21 @@ class RangeProfile(Drawn):
 
     range: FloatArray
     values: ComplexArray
+    error: float
     resolution: float
 
     def __repr__(self) -> str:
         size = np.abs(self.values)
         return (
             f"RangeProfile({len(self.range)} ranges, {self.range[0]:.4g} to {self.range[-1]:.4g})\n"
-            f"  resolution {self.resolution:.3g}, up to {size.max():.4g} at {self.range[int(np.argmax(size))]:.4g}"
+            f"  resolution {self.resolution:.3g}, up to {size.max():.4g} at {self.range[int(np.argmax(size))]:.4g}, "
+            f"error {self.error:.2g} at most"
         )
 
 
-def range_profile(field: ArrayLike, wavenumbers: ArrayLike, *, window: str = "hann") -> RangeProfile:
+def range_profile(
+    field: ArrayLike, wavenumbers: ArrayLike, *, error: ArrayLike | None = None, window: str = "hann"
+) -> RangeProfile:
     """Range profile of backscattered amplitudes.
 
     Parameters
@@ -247,12 +261,14 @@ def range_profile(field: ArrayLike, wavenumbers: ArrayLike, *, window: str = "ha
         Backscatter f at the wavenumbers.
     wavenumbers : (n,), 1/L
         Ascending, equally spaced, eight or more.
+    error : (n,), L, optional
+        Of the field.
     window : {"hann", "taylor", "none"}
 
     Raises
     ------
     InvalidInputError
-        If the wavenumbers are not as described.
+        If wavenumbers or errors are not as described.
 
     Examples
     --------
@@ -267,4 +283,5 @@ def range_profile(field: ArrayLike, wavenumbers: ArrayLike, *, window: str = "ha
         raise InvalidInputError(f"a range profile takes one value at each wavenumber, not {f.shape}")
     # there and back
     found = band_sum(f, wavenumbers, window=window, what="a range profile")
-    return RangeProfile(0.5 * found.delay, found.values, 0.5 * found.resolution)
+    bound = float(_bound(found.weights, error, f.shape))
+    return RangeProfile(0.5 * found.delay, found.values, bound, 0.5 * found.resolution)
