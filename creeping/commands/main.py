@@ -214,12 +214,20 @@ def run(
         if unfinished is None:
             print((output / resuming.SUMMARY).read_text() if json_ else f"nothing is missing in {output}")
             return 0
-        if why_no_rays(shape):
-            result = _run_results.run_solved(shape, job, incident, planes, written, progress, unfinished)
+        without = why_no_rays(shape)
+        if not without:
+            progress("shadow line")
+            try:
+                line = cr.shadow_line(shape, source=incident)
+            except cr.SingularIncidenceError as error:
+                if job is None or source is not None:
+                    raise
+                # the equation needs no line
+                without = str(error)
+        if without:
+            result = _run_results.run_solved(shape, without, job, incident, planes, written, progress, unfinished)
             print(json.dumps(result, indent=1) if json_ else _run_results.readable_solved(result, output))
             return 0
-        progress("shadow line")
-        line = cr.shadow_line(shape, source=incident)
         length = ray_length(line, length, wavenumber=job.wavenumber if job else None)
         progress("flow")
         steps = enough_steps(shape, length)

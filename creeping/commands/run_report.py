@@ -20,7 +20,6 @@ from creeping.field.cut_result import FieldCut, cut_grid, field_cut
 from creeping.field.equation.solution import Solution
 from creeping.field.validity_range import Validity, validity_words
 from creeping.geometry.arguments import rays_refused
-from creeping.geometry.parts import why_no_rays
 from creeping.geometry.piecewise import is_piecewise
 from creeping.rays.fan import RayFan
 from creeping.rays.status import RayStatus
@@ -272,6 +271,7 @@ def readable(summary: dict[str, Any], output: Path) -> str:
 
 def run_solved(
     shape: Any,
+    without: str,
     job: Job | None,
     incident: Any,
     planes: Sequence[Plane],
@@ -279,7 +279,7 @@ def run_solved(
     progress: Progress,
     unfinished: Unfinished,
 ) -> dict[str, Any]:
-    """Write the far field of a plane wave on a body without rays; returns the summary.
+    """Write the far field of a plane wave that launches no rays, ``without`` says why; returns the summary.
 
     Raises
     ------
@@ -289,13 +289,13 @@ def run_solved(
     if job is None:
         raise InvalidInputError(f"{rays_refused(shape)}; give --wavenumber, --frequency or --wavelength")
     if not hasattr(incident, "direction"):
-        raise InvalidInputError(f"--source is of bodies with rays; {why_no_rays(shape)}: give --direction")
+        raise InvalidInputError(f"--source is of bodies with rays; {without}: give --direction")
     started = time.perf_counter()
     with kept(unfinished, progress.message):
         solution, far, seconds = job.solved(shape, incident.direction, progress, unfinished)
         progress("pictures and files" if output.pictures else "files")
         summary: dict[str, Any] = {"body": unfinished.asked["body"], "version": __version__, **wave_entry(incident)}
-        summary |= {"rays": None, "without_rays": why_no_rays(shape), "nodes": solution.nodes}
+        summary |= {"rays": None, "without_rays": without, "nodes": solution.nodes}
         summary["field"], names = job.write(far, solution, output)
         summary["planes"], more = write_planes(planes, job, solution, output, progress)
         summary["field"]["seconds"], summary["files"] = seconds, [*names, *more, "summary.json"]

@@ -9,12 +9,13 @@ Sources: Derivations, F16.
 """
 
 import os
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
-from creeping.errors import InvalidInputError
+from creeping.errors import InvalidInputError, SingularIncidenceError
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
 from creeping.field.results.comparison import decibels, shown_range
@@ -87,7 +88,12 @@ def currents_picture(
     body: Any = currents.body
     asked: Any = {"view": view, "cells": cells or cells_of(body, k)}
     direction = currents.direction
-    drawing = bare(body, direction, **asked) if why_no_rays(body) else compose(shadow_line(body, direction), **asked)
+    line = None
+    if not why_no_rays(body):
+        # none is drawn that crosses itself
+        with suppress(SingularIncidenceError):
+            line = shadow_line(body, direction)
+    drawing = compose(line, **asked) if line else bare(body, direction, **asked)
     drawing = replace(drawing, title=caption(body, PlaneWave(direction), name=name))
     levels = current_levels(currents, drawing.mesh.vertices, incident)
     what = {"soft": "|∂u/∂n|/k", "conductor": "|n × H|"}.get(currents.boundary.kind, "|u|")

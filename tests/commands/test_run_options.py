@@ -116,3 +116,14 @@ def test_pictures_have_titles_and_components(tmp_path, monkeypatch):
     words = drawn["far.png"][2]
     assert words["components"] == ("pt", "tt") and words["quantity"] == "rcs"
     assert words["title"].startswith("ball\\$, d = (1, 0, 0)\n500 MHz, k = ") and ", pec; error " in words["title"]
+
+
+def test_a_line_that_crosses_itself_leaves_the_field_to_the_equation(tmp_path, capsys):
+    """Every wave in the plane of a torus has one; what it scatters backwards and on is known all the same."""
+    given = ["--wavenumber", 4, "--boundary", "soft", "--observe", "backscatter", "-o", tmp_path]
+    assert ran("run", "torus:R=1,r=0.4", "--direction", 1, 0, 0, *given, "--no-pictures") == 0
+    assert "no creeping rays: the shadow line crosses itself at 4 points" in capsys.readouterr().out
+    (row,) = table(tmp_path / "far.csv")
+    exact = cr.solve(sc.Torus(1.0, 0.4), (1, 0, 0), wavenumber=4.0, boundary="soft").far_field([-1, 0, 0])
+    assert float(row["re"]) == pytest.approx(exact.total[0].real) and int(row["unresolved"]) == 0
+    assert ran("run", "torus:R=1,r=0.4", "--direction", 1, 0, 0, "-o", tmp_path / "rays") == 3
