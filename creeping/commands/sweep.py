@@ -112,7 +112,7 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Prog
     from creeping.sweeping.request import in_patches
     from creeping.sweeping.results import require
     from creeping.sweeping.run import open_store
-    from creeping.sweeping.storage.store import SweepStore
+    from creeping.sweeping.store import SweepStore
 
     for package in ("xarray", "zarr"):
         require(package)
@@ -128,7 +128,7 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Prog
         progress.note(f"each incidence by {told.by}")
     progress("flow")
     if resume and folder.exists():
-        store = SweepStore.open(folder, mending=True)
+        store = SweepStore.open(folder)
         # the size of its tasks is the store's, whatever the study says now
         flow, chunk = store.flow(body), store.chunk
     else:

@@ -25,12 +25,12 @@ from creeping.rays.reach import AUTO
 from creeping.rays.transport import Flow, checked_flow
 from creeping.storage.memory import within_budget
 from creeping.sweeping.between.worth import with_paying_lattice
+from creeping.sweeping.layout import UNDONE
 from creeping.sweeping.plan import Arrays, FirstTaskGuard, SweepPlan, bytes_of, common_error, compute, task_size
 from creeping.sweeping.request import Quantity, in_patches, sweep_length, sweep_request
 from creeping.sweeping.results import as_dataset, require
 from creeping.sweeping.solved_fields import NoFlow, SolvedSweeper
-from creeping.sweeping.storage.layout import UNDONE
-from creeping.sweeping.storage.store import SweepStore, mended
+from creeping.sweeping.store import SweepStore
 from creeping.sweeping.sweeper import Passed, Sweeper
 from creeping.sweeping.t_matrix_fields import TMatrixSweeper
 
@@ -171,7 +171,7 @@ def sweep_directions(
     chunk = None if chunk is None else whole_number(chunk, "chunk")
     going_on = store is not None and resume and Path(store).exists()
     chunk = (
-        SweepStore.open(str(store), mending=True).chunk
+        SweepStore.open(str(store)).chunk
         if going_on
         else task_size(request, len(unit), chunk, shared=store is not None or client is not None)
     )
@@ -248,9 +248,9 @@ def open_store(
         If the folder exists and ``resume`` is false, or holds another study.
     """
     if resume and Path(folder).exists():
-        store = SweepStore.open(folder, mending=True)
+        store = SweepStore.open(folder)
         store.require_same(plan)
-        for text in mended(store, plan):
+        for text in store.mended(plan):
             note(text)
         return store
     if Path(folder).exists():

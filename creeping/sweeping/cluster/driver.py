@@ -24,10 +24,10 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.errors import CreepingError
 from creeping.geometry.surface import Surface
+from creeping.sweeping.layout import UNDONE
 from creeping.sweeping.plan import Arrays, FirstTaskGuard, Maker, SweepPlan, common_error, compute
 from creeping.sweeping.request import SweepRequest
-from creeping.sweeping.storage.layout import UNDONE
-from creeping.sweeping.storage.store import SweepStore
+from creeping.sweeping.store import SweepStore
 from creeping.sweeping.t_matrix_fields import TMatrixSweeper
 
 AHEAD = 2
@@ -306,8 +306,7 @@ class Recipe:
         if not hasattr(self.own, "tools"):
             if not Path(self.folder).is_dir():
                 raise CreepingError(f"the worker on {process()[0]} does not see {self.folder}; give a shared folder")
-            # the driver has mended it
-            store = SweepStore.open(self.folder, mending=True)
+            store = SweepStore.open(self.folder)
             sweeper = self.make(store.flow(self.body), self.request)
             if isinstance(sweeper, TMatrixSweeper):
                 sweeper.store = store.matrices

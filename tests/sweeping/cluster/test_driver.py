@@ -13,7 +13,7 @@ from creeping.geometry.directions import fibonacci_directions
 from creeping.shadow.status import FAILED
 from creeping.sweeping.cluster import driver as cluster
 from creeping.sweeping.run import fill
-from creeping.sweeping.storage.store import SweepStore
+from creeping.sweeping.store import SweepStore
 
 
 @pytest.fixture(scope="module")
