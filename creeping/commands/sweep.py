@@ -107,9 +107,8 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Prog
     """Plan and store of a study; the flow of a sweep that goes on is the one it was begun with."""
     from creeping.commands.forecast import boundary_words, forecast
     from creeping.field.boundary import parse_boundary
-    from creeping.sweeping.between.worth import with_paying_lattice
     from creeping.sweeping.plan import SweepPlan, task_size
-    from creeping.sweeping.request import in_patches
+    from creeping.sweeping.request import with_lattice
     from creeping.sweeping.results import require
     from creeping.sweeping.run import open_store
     from creeping.sweeping.store import SweepStore
@@ -133,11 +132,11 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Prog
         flow, chunk = store.flow(body), store.chunk
     else:
         flow, chunk = _flow(read, body, request, cache, progress), task_size(request, len(read.incidences), read.chunk)
-    request = with_paying_lattice(flow, request, read.incidences)
+    request = with_lattice(request, read.incidences)
     plan = SweepPlan(
         flow,
         request,
-        read.incidences[in_patches(request, read.incidences)],
+        read.incidences,
         chunk,
         asked={"flow": read.flow, "tolerance": read.tolerance},
         text=read.text,
@@ -148,8 +147,7 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Prog
 def _flow(read: Any, body: Any, request: Any, cache: bool, progress: Any) -> Any:
     from creeping import build_phase_map
     from creeping.geometry.parts import why_no_rays
-    from creeping.sweeping.solved_fields import NoFlow
-    from creeping.sweeping.sweeper import outputs_of
+    from creeping.sweeping.sweeper import NoFlow, outputs_of
 
     if why_no_rays(body):
         return NoFlow(body)

@@ -6,14 +6,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, cast
 
-import numpy as np
-
 from creeping._progress import reporting
-from creeping._typing import Any, ArrayLike, IntArray
+from creeping._typing import Any, ArrayLike
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.boundary import BoundaryLike
 from creeping.geometry.arguments import flag, folder_path, rays_refused, shown, whole_number
@@ -24,15 +21,12 @@ from creeping.phaseflow.phase_map import PhaseMap
 from creeping.rays.reach import AUTO
 from creeping.rays.transport import Flow, checked_flow
 from creeping.storage.memory import within_budget
-from creeping.sweeping.between.worth import with_paying_lattice
 from creeping.sweeping.layout import UNDONE
 from creeping.sweeping.plan import Arrays, FirstTaskGuard, SweepPlan, bytes_of, common_error, compute, task_size
-from creeping.sweeping.request import Quantity, in_patches, sweep_length, sweep_request
+from creeping.sweeping.request import Quantity, sweep_length, sweep_request, with_lattice
 from creeping.sweeping.results import as_dataset, require
-from creeping.sweeping.solved_fields import NoFlow, SolvedSweeper
 from creeping.sweeping.store import SweepStore
-from creeping.sweeping.sweeper import Passed, Sweeper
-from creeping.sweeping.t_matrix_fields import TMatrixSweeper
+from creeping.sweeping.sweeper import NoFlow, Passed
 
 if TYPE_CHECKING:
     import xarray
@@ -167,7 +161,7 @@ def sweep_directions(
     unit = unit_directions(directions, "directions")
     if unit.ndim != 2:
         raise InvalidInputError(f"directions have shape {unit.shape}; give rows of three numbers, shape (n, 3)")
-    request = with_paying_lattice(flow, request, unit)
+    request = with_lattice(request, unit)
     chunk = None if chunk is None else whole_number(chunk, "chunk")
     going_on = store is not None and resume and Path(store).exists()
     chunk = (
@@ -175,20 +169,17 @@ def sweep_directions(
         if going_on
         else task_size(request, len(unit), chunk, shared=store is not None or client is not None)
     )
-    patches = in_patches(request, unit)
-    plan = SweepPlan(flow, request, unit[patches], chunk)
+    plan = SweepPlan(flow, request, unit, chunk)
     with reporting(progress, "incidences") as told:
         if store is None:
-            return in_memory(plan, told, patches)
+            return in_memory(plan, told)
         opened = open_store(plan, store, resume=resume)
         fill(plan, opened, client=client, progress=told)
-    return opened.dataset().isel(incidence=np.argsort(patches))
+    return opened.dataset()
 
 
-def in_memory(plan: SweepPlan, progress: Progress | None = None, order: IntArray | None = None) -> xarray.Dataset:
+def in_memory(plan: SweepPlan, progress: Progress | None = None) -> xarray.Dataset:
     """Dataset of a plan, computed in this process and kept in memory.
-
-    The incidences of the plan may be those of the dataset in another ``order`` (n,).
 
     Raises
     ------
@@ -206,21 +197,17 @@ def in_memory(plan: SweepPlan, progress: Progress | None = None, order: IntArray
     arrays: Arrays = plan.request.empty(count, filled=False)
     errors: list[tuple[int, str]] = []
     guard = FirstTaskGuard()
-    order = np.arange(count) if order is None else order
     for task in range(plan.tasks):
         rows = plan.rows(task)
-        if progress and isinstance(sweeper, Sweeper | SolvedSweeper | TMatrixSweeper):
-            sweeper.passed = _within(rows.start, rows, count, started, progress)
+        sweeper.passed = _within(rows.start, rows, count, started, progress)
         found, failed = compute(sweeper, plan.incidences[rows])
         for name, values in arrays.items():
-            values[order[rows]] = found[name]
-        errors += [(int(order[rows.start + row]), text) for row, text in failed.items()]
+            values[rows] = found[name]
+        errors += [(rows.start + row, text) for row, text in failed.items()]
         guard.add(rows.stop - rows.start, common_error(failed, rows.stop - rows.start))
         if progress:
             progress(rows.stop, count, time.perf_counter() - started)
-    incidences = np.empty_like(plan.incidences)
-    incidences[order] = plan.incidences
-    return as_dataset(replace(plan, incidences=incidences), arrays, errors)
+    return as_dataset(plan, arrays, errors)
 
 
 def _within(done: float, rows: slice, count: int, started: float, progress: Progress | None) -> Passed:
@@ -338,15 +325,13 @@ def _here(
     within: Callable[[int], Passed],
 ) -> Any:
     """Compute tasks one after the other; yields each when it is committed."""
-    sweeper = plan.make(plan.flow, plan.request) if tasks else None
-    if isinstance(sweeper, TMatrixSweeper):
-        sweeper.store = store.matrices
+    sweeper = plan.make(plan.flow, plan.request)
+    sweeper.store = store.matrices
     status, guard = store.status(), FirstTaskGuard()
     for task in tasks:
-        if stop() or sweeper is None:
+        if stop():
             return
-        if isinstance(sweeper, Sweeper | SolvedSweeper | TMatrixSweeper):
-            sweeper.passed = within(task)
+        sweeper.passed = within(task)
         arrays, errors = compute(sweeper, plan.incidences[plan.rows(task)])
         store.write_task(task, arrays, errors)
         store.commit(task, failures=bool(errors))

@@ -28,7 +28,6 @@ from creeping.sweeping.layout import UNDONE
 from creeping.sweeping.plan import Arrays, FirstTaskGuard, Maker, SweepPlan, common_error, compute
 from creeping.sweeping.request import SweepRequest
 from creeping.sweeping.store import SweepStore
-from creeping.sweeping.t_matrix_fields import TMatrixSweeper
 
 AHEAD = 2
 """Tasks in flight for each thread of the workers."""
@@ -308,8 +307,7 @@ class Recipe:
                 raise CreepingError(f"the worker on {process()[0]} does not see {self.folder}; give a shared folder")
             store = SweepStore.open(self.folder)
             sweeper = self.make(store.flow(self.body), self.request)
-            if isinstance(sweeper, TMatrixSweeper):
-                sweeper.store = store.matrices
+            sweeper.store = store.matrices
             self.own.tools = (sweeper, store)
         tools: tuple[Any, SweepStore] = self.own.tools
         return tools
