@@ -79,7 +79,7 @@ def drive(folder, count, chunk, workers):
     if not workers:
         fill(work, store, progress=say)
         return
-    from creeping.sweeping.cluster.driver import local_client
+    from creeping.sweeping.cluster import local_client
 
     with local_client(workers) as client:
         fill(work, store, client=client, progress=say)

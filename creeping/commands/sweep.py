@@ -178,7 +178,7 @@ def _run(plan: Any, store: Any, scheduler: str | None, workers: int | None, mete
             from creeping.sweeping.results import require
 
             require("distributed")
-            from creeping.sweeping.cluster.driver import local_client
+            from creeping.sweeping.cluster import local_client
 
             meter.note(f"starting {workers} worker processes")
             with local_client(workers) as client:
