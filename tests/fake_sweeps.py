@@ -27,6 +27,7 @@ class FakeSweeper:
 
     def __init__(self, flow, request):
         self.flow, self.request = flow, request
+        self.passed, self.store = lambda _: None, None
 
     @property
     def body(self):
@@ -78,7 +79,7 @@ def drive(folder, count, chunk, workers):
     if not workers:
         fill(work, store, progress=say)
         return
-    from creeping.sweeping.cluster.driver import local_client
+    from creeping.sweeping.cluster import local_client
 
     with local_client(workers) as client:
         fill(work, store, client=client, progress=say)

@@ -107,12 +107,11 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Prog
     """Plan and store of a study; the flow of a sweep that goes on is the one it was begun with."""
     from creeping.commands.forecast import boundary_words, forecast
     from creeping.field.boundary import parse_boundary
-    from creeping.sweeping.between.worth import with_paying_lattice
     from creeping.sweeping.plan import SweepPlan, task_size
-    from creeping.sweeping.request import in_patches
+    from creeping.sweeping.request import with_lattice
     from creeping.sweeping.results import require
     from creeping.sweeping.run import open_store
-    from creeping.sweeping.storage.store import SweepStore
+    from creeping.sweeping.store import SweepStore
 
     for package in ("xarray", "zarr"):
         require(package)
@@ -128,16 +127,16 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Prog
         progress.note(f"each incidence by {told.by}")
     progress("flow")
     if resume and folder.exists():
-        store = SweepStore.open(folder, mending=True)
+        store = SweepStore.open(folder)
         # the size of its tasks is the store's, whatever the study says now
         flow, chunk = store.flow(body), store.chunk
     else:
         flow, chunk = _flow(read, body, request, cache, progress), task_size(request, len(read.incidences), read.chunk)
-    request = with_paying_lattice(flow, request, read.incidences)
+    request = with_lattice(request, read.incidences)
     plan = SweepPlan(
         flow,
         request,
-        read.incidences[in_patches(request, read.incidences)],
+        read.incidences,
         chunk,
         asked={"flow": read.flow, "tolerance": read.tolerance},
         text=read.text,
@@ -148,8 +147,7 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Prog
 def _flow(read: Any, body: Any, request: Any, cache: bool, progress: Any) -> Any:
     from creeping import build_phase_map
     from creeping.geometry.parts import why_no_rays
-    from creeping.sweeping.solved_fields import NoFlow
-    from creeping.sweeping.sweeper import outputs_of
+    from creeping.sweeping.sweeper import NoFlow, outputs_of
 
     if why_no_rays(body):
         return NoFlow(body)
@@ -180,7 +178,7 @@ def _run(plan: Any, store: Any, scheduler: str | None, workers: int | None, mete
             from creeping.sweeping.results import require
 
             require("distributed")
-            from creeping.sweeping.cluster.driver import local_client
+            from creeping.sweeping.cluster import local_client
 
             meter.note(f"starting {workers} worker processes")
             with local_client(workers) as client:

@@ -23,7 +23,7 @@ from creeping.field.problem import has_expansions
 from creeping.field.results.comparison import decibels
 from creeping.field.results.far_result import FarField
 from creeping.field.routes import affordable
-from creeping.field.tmatrix.computing import expected
+from creeping.field.tmatrix.computing import expected, kept_t_matrix, known_t_matrix
 from creeping.field.validity_range import Validity, validity
 from creeping.geodesics.equations import natural_horizon
 from creeping.geometry.directions import directions_from_angles
@@ -37,7 +37,6 @@ from creeping.rays.isophase import IsoPhaseCurve, iso_phase_curves
 from creeping.rays.transport import Flow
 from creeping.shadow.line import ShadowLine, shadow_line
 from creeping.storage.memory import budget
-from creeping.sweeping.t_matrix_fields import kept_t_matrix, known_t_matrix
 
 MOST_STEPS = 192
 """Of a ray."""

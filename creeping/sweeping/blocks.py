@@ -25,7 +25,7 @@ from creeping.rays.transport import Flow
 from creeping.shadow.status import FAILED
 from creeping.sweeping.results import MISSING, count_attributes, require
 from creeping.sweeping.run import Progress, sweep_directions
-from creeping.sweeping.storage.store import SweepStore
+from creeping.sweeping.store import SweepStore
 
 if TYPE_CHECKING:
     import xarray
@@ -50,7 +50,7 @@ Told = Callable[[Rows], None]
 def stored_flow(store: str | Path, body: Surface) -> Flow | None:
     """Flow that a folder of blocks was begun with; None where none of them has begun."""
     first = Path(store) / _name(0)
-    return SweepStore.open(first, mending=True).flow(body) if first.exists() else None
+    return SweepStore.open(first).flow(body) if first.exists() else None
 
 
 def stored_sizes(store: str | Path) -> tuple[int, int] | None:
@@ -58,7 +58,7 @@ def stored_sizes(store: str | Path) -> tuple[int, int] | None:
     first = Path(store) / _name(0)
     if not first.exists():
         return None
-    found = SweepStore.open(first, mending=True)
+    found = SweepStore.open(first)
     return len(found.key["request"]["wavenumbers"]), found.chunk
 
 
@@ -129,7 +129,7 @@ def sweep_blocks(
             place = Path(store) / _name(number)
             options: dict[str, Any] = asked | {"chunk": chunk, "progress": told, "resume": resume, "store": place}
             sweep_directions(flow, incidences, wavenumbers=block, **options)
-            done.append(SweepStore.open(place).loaded())
+            done.append(SweepStore.open(place).dataset(loaded=True))
             if number + 1 < len(blocks):
                 show()
     except BaseException:
@@ -171,7 +171,7 @@ def _so_far(done: list[xarray.Dataset], place: Path, blocks: list[FloatArray]) -
     """What the blocks hold that are done, and the one at a place; nothing if there is none yet."""
     parts = list(done)
     if len(parts) < len(blocks) and place.exists():
-        parts.append(SweepStore.open(place, mending=True).loaded())
+        parts.append(SweepStore.open(place).dataset(loaded=True))
     if not parts:
         return None
     parts += [_empty(parts[0], block) for block in blocks[len(parts) :]]

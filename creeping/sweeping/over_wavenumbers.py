@@ -98,7 +98,7 @@ def _made(make: Any, wavenumbers: list[float], client: Any, progress: Progress |
             each: Iterator[TMatrix] = (make(wavenumber=k) for k in wavenumbers)
         else:
             require("distributed")
-            from creeping.sweeping.cluster.driver import connected, in_order
+            from creeping.sweeping.cluster import connected, in_order
 
             own = stack.enter_context(connected(client)) if isinstance(client, str) else client
             each = in_order(own, make, [{"wavenumber": k} for k in wavenumbers])

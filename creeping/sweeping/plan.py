@@ -19,15 +19,16 @@ from creeping._version import __version__
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geodesics.integrator import ErrorEstimate
+from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface, fingerprint
 from creeping.phaseflow.cache import load_phase_map
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.rays.transport import Flow
 from creeping.shadow.status import FAILED
 from creeping.storage.folder import content_digest
-from creeping.sweeping.between.worth import sweeper_of
+from creeping.sweeping.between import FieldsBetween
 from creeping.sweeping.request import SweepRequest
-from creeping.sweeping.solved_fields import NoFlow
+from creeping.sweeping.sweeper import NoFlow, Passed, Sweeper
 
 MOST_IN_TASK, MOST_AT_ONCE, MOST_BETWEEN = 1024, 256, 4096
 """Incidences of a task, of one that nobody else waits for, and of one whose results are interpolated."""
@@ -43,6 +44,9 @@ Arrays = dict[str, np.ndarray[Any, Any]]
 class Computing(Protocol):
     """What gives the results of unit directions (n, 3), as `Sweeper` does."""
 
+    passed: Passed
+    store: Path | None
+
     @property
     def request(self) -> SweepRequest:
         """What is computed."""
@@ -52,6 +56,12 @@ class Computing(Protocol):
 
 
 Maker = Callable[[Flow, SweepRequest], Computing]
+
+
+def sweeper_of(flow: Flow, request: SweepRequest) -> Sweeper | FieldsBetween:
+    """What gives the results of unit directions (n, 3); bodies with creases have no rays that all go on."""
+    plain = request.lattice is None or is_piecewise(flow.body)
+    return Sweeper(flow, request) if plain else FieldsBetween(flow, request)
 
 
 @dataclass(frozen=True, eq=False)

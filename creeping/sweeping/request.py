@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from creeping._typing import Any, ArrayLike, FloatArray, IntArray
+from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked, checked_across
 from creeping.field.boundary import BoundaryLike, boundary_name, parse_boundary
@@ -312,11 +312,6 @@ def sweep_request(
 def with_lattice(request: SweepRequest, incidences: FloatArray) -> SweepRequest:
     """The request with the lattice of unit directions (n, 3), where an accuracy is asked for and a lattice pays."""
     return request if request.accuracy is None else replace(request, lattice=lattice_of(incidences))
-
-
-def in_patches(request: SweepRequest, incidences: FloatArray) -> IntArray:
-    """Order of the unit directions (n, 3) of a sweep in which tasks are patches, where nodes on the sphere serve it."""
-    return np.arange(len(incidences)) if request.lattice is None else request.lattice.order(incidences)
 
 
 def sweep_length(body: Surface, length: float | Literal["auto"], wavenumbers: ArrayLike, *, leap: float = 0.0) -> float:

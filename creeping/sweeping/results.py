@@ -22,7 +22,6 @@ from creeping.shadow.status import INCIDENCE_STATUSES
 from creeping.storage.memory import required
 from creeping.sweeping.plan import Arrays, SweepPlan
 from creeping.sweeping.request import SweepRequest
-from creeping.sweeping.solved_fields import SERVED
 
 if TYPE_CHECKING:
     import xarray
@@ -30,6 +29,8 @@ from typing import TYPE_CHECKING
 
 from creeping.errors import InvalidInputError
 
+SERVED = "rays+optics"
+"""What serves a body of pieces in place of isolated rays alone, as `creeping.FarField.method` says it."""
 MISSING = -1
 """Status of an incidence that is not computed yet."""
 STATUS_NAMES = {code: text.partition(":")[0] for code, text in INCIDENCE_STATUSES.items()} | {MISSING: "missing"}

@@ -4,16 +4,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, cast
 
-import numpy as np
-
 from creeping._progress import reporting
-from creeping._typing import Any, ArrayLike, IntArray
+from creeping._typing import Any, ArrayLike
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.boundary import BoundaryLike
 from creeping.geometry.arguments import flag, folder_path, rays_refused, shown, whole_number
@@ -24,15 +22,12 @@ from creeping.phaseflow.phase_map import PhaseMap
 from creeping.rays.reach import AUTO
 from creeping.rays.transport import Flow, checked_flow
 from creeping.storage.memory import within_budget
-from creeping.sweeping.between.worth import with_paying_lattice
+from creeping.sweeping.layout import UNDONE
 from creeping.sweeping.plan import Arrays, FirstTaskGuard, SweepPlan, bytes_of, common_error, compute, task_size
-from creeping.sweeping.request import Quantity, in_patches, sweep_length, sweep_request
+from creeping.sweeping.request import Quantity, sweep_length, sweep_request, with_lattice
 from creeping.sweeping.results import as_dataset, require
-from creeping.sweeping.solved_fields import NoFlow, SolvedSweeper
-from creeping.sweeping.storage.layout import UNDONE
-from creeping.sweeping.storage.store import SweepStore, mended
-from creeping.sweeping.sweeper import Passed, Sweeper
-from creeping.sweeping.t_matrix_fields import TMatrixSweeper
+from creeping.sweeping.store import SweepStore
+from creeping.sweeping.sweeper import NoFlow
 
 if TYPE_CHECKING:
     import xarray
@@ -167,28 +162,25 @@ def sweep_directions(
     unit = unit_directions(directions, "directions")
     if unit.ndim != 2:
         raise InvalidInputError(f"directions have shape {unit.shape}; give rows of three numbers, shape (n, 3)")
-    request = with_paying_lattice(flow, request, unit)
+    request = with_lattice(request, unit)
     chunk = None if chunk is None else whole_number(chunk, "chunk")
     going_on = store is not None and resume and Path(store).exists()
     chunk = (
-        SweepStore.open(str(store), mending=True).chunk
+        SweepStore.open(str(store)).chunk
         if going_on
         else task_size(request, len(unit), chunk, shared=store is not None or client is not None)
     )
-    patches = in_patches(request, unit)
-    plan = SweepPlan(flow, request, unit[patches], chunk)
+    plan = SweepPlan(flow, request, unit, chunk)
     with reporting(progress, "incidences") as told:
         if store is None:
-            return in_memory(plan, told, patches)
+            return in_memory(plan, told)
         opened = open_store(plan, store, resume=resume)
         fill(plan, opened, client=client, progress=told)
-    return opened.dataset().isel(incidence=np.argsort(patches))
+    return opened.dataset()
 
 
-def in_memory(plan: SweepPlan, progress: Progress | None = None, order: IntArray | None = None) -> xarray.Dataset:
+def in_memory(plan: SweepPlan, progress: Progress | None = None) -> xarray.Dataset:
     """Dataset of a plan, computed in this process and kept in memory.
-
-    The incidences of the plan may be those of the dataset in another ``order`` (n,).
 
     Raises
     ------
@@ -201,40 +193,61 @@ def in_memory(plan: SweepPlan, progress: Progress | None = None, order: IntArray
         raise InvalidInputError(f"{count} incidences give {size / 1e9:.0f} GB of results; give store=, a folder")
     # they are put together of tasks
     within_budget(2 * size, f"results of {count} incidences", "give store=, a folder, or ask for fewer", asked=count)
-    started = time.perf_counter()
-    sweeper = plan.make(plan.flow, plan.request)
     arrays: Arrays = plan.request.empty(count, filled=False)
     errors: list[tuple[int, str]] = []
-    guard = FirstTaskGuard()
-    order = np.arange(count) if order is None else order
-    for task in range(plan.tasks):
+    told = _Told(progress, count)
+    for task, found, failed in _computed(plan, range(plan.tasks), told):
         rows = plan.rows(task)
-        if progress and isinstance(sweeper, Sweeper | SolvedSweeper | TMatrixSweeper):
-            sweeper.passed = _within(rows.start, rows, count, started, progress)
-        found, failed = compute(sweeper, plan.incidences[rows])
         for name, values in arrays.items():
-            values[order[rows]] = found[name]
-        errors += [(int(order[rows.start + row]), text) for row, text in failed.items()]
-        guard.add(rows.stop - rows.start, common_error(failed, rows.stop - rows.start))
-        if progress:
-            progress(rows.stop, count, time.perf_counter() - started)
-    incidences = np.empty_like(plan.incidences)
-    incidences[order] = plan.incidences
-    return as_dataset(replace(plan, incidences=incidences), arrays, errors)
+            values[rows] = found[name]
+        errors += [(rows.start + row, text) for row, text in failed.items()]
+        told.add(rows)
+    return as_dataset(plan, arrays, errors)
 
 
-def _within(done: float, rows: slice, count: int, started: float, progress: Progress | None) -> Passed:
-    """What tells the progress within a task, but for its end; so many incidences were done before."""
-    last = time.perf_counter()
+class _Told:
+    """What is told of the progress: incidences done, those to do, and seconds."""
 
-    def passed(share: float) -> None:
-        nonlocal last
+    def __init__(self, progress: Progress | None, count: int, done: int = 0) -> None:
+        self._progress, self._count, self._done = progress, count, done
+        self._started = self._last = time.perf_counter()
+
+    def within(self, rows: slice, share: float) -> None:
+        """Tell how far a task is, now and then, but not its end."""
         now = time.perf_counter()
-        if progress and share < 1 and now - last >= EVERY:
-            last = now
-            progress(done + share * (rows.stop - rows.start), count, now - started)
+        if self._progress and share < 1 and now - self._last >= EVERY:
+            self._last = now
+            self._progress(self._done + share * (rows.stop - rows.start), self._count, now - self._started)
 
-    return passed
+    def add(self, rows: slice) -> None:
+        """Tell that a task is done."""
+        self._done += rows.stop - rows.start
+        self._last = time.perf_counter()
+        if self._progress:
+            self._progress(self._done, self._count, self._last - self._started)
+
+
+def _computed(
+    plan: SweepPlan,
+    tasks: Iterable[int],
+    told: _Told,
+    stop: Callable[[], bool] = lambda: False,
+    store: SweepStore | None = None,
+) -> Iterator[tuple[int, Arrays, dict[int, str]]]:
+    """Results of tasks, one after the other in this process, and the errors of incidences that failed, by row."""
+    sweeper = plan.make(plan.flow, plan.request)
+    sweeper.store = store.matrices if store else None
+    before, guard = store.status() if store else [UNDONE] * plan.tasks, FirstTaskGuard()
+    for task in tasks:
+        if stop():
+            return
+        rows = plan.rows(task)
+        sweeper.passed = partial(told.within, rows)
+        arrays, errors = compute(sweeper, plan.incidences[rows])
+        yield task, arrays, errors
+        # those that failed before may fail again
+        if before[task] == UNDONE:
+            guard.add(rows.stop - rows.start, common_error(errors, rows.stop - rows.start))
 
 
 def open_store(
@@ -248,9 +261,9 @@ def open_store(
         If the folder exists and ``resume`` is false, or holds another study.
     """
     if resume and Path(folder).exists():
-        store = SweepStore.open(folder, mending=True)
+        store = SweepStore.open(folder)
         store.require_same(plan)
-        for text in mended(store, plan):
+        for text in store.mended(plan):
             note(text)
         return store
     if Path(folder).exists():
@@ -294,33 +307,15 @@ def fill(
     CreepingError
         If the store is in use or cannot be written, or the first incidences all fail with one and the same error.
     """
-    started = time.perf_counter()
     with store.locked():
         missing = store.missing()
-        done = len(plan.incidences) - sum(plan.rows(t).stop - plan.rows(t).start for t in missing)
-
-        def within(task: int) -> Passed:
-            return _within(done, plan.rows(task), len(plan.incidences), started, progress)
-
-        def report(task: int) -> None:
-            nonlocal done
-            done += plan.rows(task).stop - plan.rows(task).start
-            if progress:
-                progress(done, len(plan.incidences), time.perf_counter() - started)
-
         left = len(missing)
+        done = len(plan.incidences) - sum(plan.rows(t).stop - plan.rows(t).start for t in missing)
+        told = _Told(progress, len(plan.incidences), done)
         try:
-            if client is None:
-                for task in _here(plan, store, missing[:most], stop, within):
-                    left -= 1
-                    report(task)
-            elif missing:
-                require("distributed")
-                from creeping.sweeping.cluster.driver import fill_on
-
-                for task in fill_on(client, plan, store, missing, stop):
-                    left -= 1
-                    report(task)
+            for task in _filled(plan, store, missing, told, client, stop, most):
+                left -= 1
+                told.add(plan.rows(task))
         except BaseException:
             # the first error is the one to tell
             with suppress(CreepingError):
@@ -330,31 +325,26 @@ def fill(
     return left == 0
 
 
-def _here(
+def _filled(
     plan: SweepPlan,
     store: SweepStore,
-    tasks: list[int],
+    missing: list[int],
+    told: _Told,
+    client: Any,
     stop: Callable[[], bool],
-    within: Callable[[int], Passed],
-) -> Any:
-    """Compute tasks one after the other; yields each when it is committed."""
-    sweeper = plan.make(plan.flow, plan.request) if tasks else None
-    if isinstance(sweeper, TMatrixSweeper):
-        sweeper.store = store.matrices
-    status, guard = store.status(), FirstTaskGuard()
-    for task in tasks:
-        if stop() or sweeper is None:
-            return
-        if isinstance(sweeper, Sweeper | SolvedSweeper | TMatrixSweeper):
-            sweeper.passed = within(task)
-        arrays, errors = compute(sweeper, plan.incidences[plan.rows(task)])
-        store.write_task(task, arrays, errors)
-        store.commit(task, failures=bool(errors))
-        yield task
-        # those that failed before may fail again
-        if status[task] == UNDONE:
-            count = store.rows(task).stop - store.rows(task).start
-            guard.add(count, common_error(errors, count))
+    most: int | None,
+) -> Iterator[int]:
+    """Compute tasks here or on a cluster; yields each when it is committed."""
+    if client is not None and missing:
+        require("distributed")
+        from creeping.sweeping.cluster import fill_on
+
+        yield from fill_on(client, plan, store, missing, stop)
+    elif missing:
+        for task, arrays, errors in _computed(plan, missing[:most], told, stop, store):
+            store.write_task(task, arrays, errors)
+            store.commit(task, failures=bool(errors))
+            yield task
 
 
 def _checked_options(store: Any, progress: Any, resume: Any) -> None:

@@ -122,10 +122,6 @@ def between(tenth: int = 1) -> Iterator[Row]:
                 first = np.cross(axis, (1.0, 0.0, 0.1))
                 circle = great_circle(first, np.cross(axis, first), count // tenth)
                 yield {"body": name, "incidences": case, **interpolated(name, circle, 512 // tenth)}
-    for count, height in ((100_000, 0.8), (1_000_000, 0.97)):
-        sphere = fibonacci_directions(count // tenth)
-        cap = sphere[sphere @ np.array([0.6, 0.48, 0.64]) > height]
-        yield {"body": "twisted", "incidences": f"cap of {count:g}", **interpolated("twisted", cap, 512 // tenth)}
 
 
 def interpolated(name: str, directions: FloatArray, few: int) -> Row:

@@ -12,7 +12,7 @@ from creeping.commands import resuming
 from creeping.field import far, routes
 from creeping.storage.parts import Parts
 from creeping.sweeping import blocks
-from creeping.sweeping.storage.layout import StoreArrays
+from creeping.sweeping.store import SweepStore
 
 TS = ["ts", "sphere:radius=0.1", "--sound-speed", 1500, "--frequency", "3:4:1kHz", "--monostatic", "az:0:4:1"]
 TS += ["--method", "t-matrix", "--boundary", "hard", "--no-pictures", "--no-cache"]
@@ -38,14 +38,14 @@ def undisturbed(words, folder):
 )
 def test_ended_at_random_moments_it_comes_to_the_same_bytes(tmp_path, monkeypatch, capsys, words, number):
     monkeypatch.setattr(blocks, "TASK", 4)
-    with ending_at(StoreArrays, "put", 0) as calls:
+    with ending_at(SweepStore, "put", 0) as calls:
         expected = undisturbed(words, tmp_path)
     rng, out, told = np.random.default_rng(3), tmp_path / "out", []
     values = 10 if words is TS else 12
     for moment in rng.integers(calls[0] // 8, calls[0] // 2, 2):
         before = stamps(out, "*.parts/*/task_status/c/*")
         code = 0
-        with ending_at(StoreArrays, "put", moment, number):
+        with ending_at(SweepStore, "put", moment, number):
             code = ran(*words, "-o", out, "--resume")
         assert code in (0, 130)
         summary = json.loads((out / "summary.json").read_text()) if (out / "summary.json").exists() else {}

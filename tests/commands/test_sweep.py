@@ -10,8 +10,8 @@ from command_line import creeping
 from filelock import FileLock
 
 from creeping.commands import sweep as _sweep_command
+from creeping.sweeping import cluster
 from creeping.sweeping import run as running
-from creeping.sweeping.cluster import driver as cluster
 from creeping.sweeping.studyfile.study import EXAMPLE
 
 STUDY = """

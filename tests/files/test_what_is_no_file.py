@@ -9,7 +9,7 @@ from creeping.errors import CreepingError
 from creeping.files import read_cut, read_ffe
 from creeping.storage.folder import read_manifest
 from creeping.storage.reading import bytes_of
-from creeping.sweeping.storage.layout import is_whole
+from creeping.sweeping.layout import unchanging_digest
 from creeping.sweeping.studyfile.schema import _table
 from creeping.sweeping.studyfile.study import read_study
 from scatterers import Cad, Mesh
@@ -38,7 +38,11 @@ def test_readers_do_not_wait(no_file, read):
 def test_others_do_not_wait(no_file):
     with pytest.raises(OSError, match="no regular file"):
         _table(no_file)
-    assert not is_whole(no_file.parent, no_file.name, "")
+    described = no_file.with_name("zarr.json")
+    os.rename(no_file, described)
+    with pytest.raises(OSError, match="no regular file"):
+        unchanging_digest(no_file.parent.parent, [])
+    os.rename(described, no_file)
     for kind, name in ((Mesh, "b.stl"), (Cad, "b.step")):
         os.rename(no_file, name)
         with pytest.raises(ValueError, match="no file"):

@@ -17,7 +17,7 @@ import pytest
 from creeping._progress import Progress
 from creeping.commands import sweep as _sweep_command
 from creeping.sweeping.run import fill, open_store
-from creeping.sweeping.storage.store import SweepStore
+from creeping.sweeping.store import SweepStore
 from tests.patience import HANGS, until
 
 ROOT = Path(__file__).parents[2]

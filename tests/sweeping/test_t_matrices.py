@@ -104,7 +104,7 @@ def test_killed_20_times_whole_matrices_remain(tmp_path):
 @pytest.mark.slow
 def test_a_cluster_gives_the_same_bits():
     pytest.importorskip("distributed")
-    from creeping.sweeping.cluster.driver import local_client
+    from creeping.sweeping.cluster import local_client
 
     body = sc.Ellipsoid(0.5, 0.6, 1.0)
     expected = [T.matrix.tobytes() for T in cr.t_matrices(body, **ASKED)]

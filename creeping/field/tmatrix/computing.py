@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from creeping._progress import telling
-from creeping._typing import ArrayLike, ComplexArray, FloatArray
+from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
 from creeping._version import __version__
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked, checked_plain
@@ -38,6 +38,7 @@ from creeping.field.tmatrix.solved_waves import SolvedWaves
 from creeping.field.tmatrix.spherical_waves import count, vector_count
 from creeping.geometry.arguments import folder_path, real_array, shown, whole_number
 from creeping.geometry.checks import unit_of
+from creeping.geometry.memo import memo
 from creeping.geometry.surface import Surface, fingerprint
 from creeping.kernels.threads import thread_count
 from creeping.storage.memory import budget, within_budget
@@ -56,6 +57,8 @@ RATE, PER_SUM = 3e10, 4e-9
 """Single-precision operations that LAPACK does in a second on a core, and seconds of a sum over images, about."""
 RESULT = "matrix"
 """Part of a store that is left at the end."""
+KEPT = 0.1
+"""Share of the memory that the matrices kept with a body may take."""
 DENSE = 0.7
 """Share of the memory that the factors and the waves at the nodes may take."""
 
@@ -244,6 +247,24 @@ def pays(body: Surface, wavenumber: float, boundary: BoundaryLike, incidences: i
     """Whether a T-matrix takes less time than the equation of so many incidences, which is not refused."""
     equation, plan = plan_of(body, wavenumber, boundary, incidences=incidences), expected(body, wavenumber, boundary)
     return not equation.refused and plan.memory <= budget() and plan.seconds < min(SECONDS, equation.seconds)
+
+
+def known_t_matrix(body: Surface, wavenumber: float, boundary: BoundaryLike) -> TMatrix | None:
+    """The T-matrix of a body that `kept_t_matrix` has made, if it is still there."""
+    known: dict[Any, TMatrix] = memo(body, "T-matrices", dict)
+    return known.get((wavenumber, boundary))
+
+
+def kept_t_matrix(body: Surface, wavenumber: float, boundary: BoundaryLike, store: Path | None = None) -> TMatrix:
+    """The T-matrix of a body, made once while there is room for it."""
+    known: dict[Any, TMatrix] = memo(body, "T-matrices", dict)
+    key = wavenumber, boundary
+    if key not in known:
+        made = t_matrix(body, wavenumber=wavenumber, boundary=boundary, store=store)
+        while known and sum(one.matrix.nbytes for one in (made, *known.values())) > KEPT * budget():
+            known.pop(next(iter(known)))
+        known[key] = made
+    return known[key]
 
 
 def _center(body: Surface, center: ArrayLike | None) -> FloatArray:

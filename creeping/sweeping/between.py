@@ -1,29 +1,29 @@
-"""Fields of incidences from those of the nodes of a lattice: sheets are interpolated, their waves summed.
+"""Fields of the incidences of a cut from those of the nodes of a lattice: sheets are interpolated, their waves summed.
 
-    f(d) = sum over sheets of a(d) exp(i k L(d)),   a and L by six nodes along each axis
+    f(d) = sum over sheets of a(d) exp(i k L(d)),   a and L by Lagrange's interpolation at six nodes
+    f(t) = sum_j w_j(t) f(x_j),   w_j(t) = prod_{i != j} (t - x_i)/(x_j - x_i),   x = -2 ... 3,  0 <= t < 1
+
+The error of the six is the largest of these differences: to what the first and the last five give, to the inner four,
+and between the first and the last four. The five know a smooth function's error to the order before; a kink between the
+nodes they may miss, the four do not.
 
 An incidence has its field so at the first level at which
 
     (sum (|da| + k |dL| |a|)^2)^(1/2) <= A (sum |a|^2)^(1/2)   of all sheets, and with 10 A of the creeping ones,
 
-d being the error of `stencil`, A the accuracy asked for. All sheets of the cell's own node go over into one of each
-other node of the stencil, and its corners have no others: none begins or ends. What fails at all levels is computed.
-Errors are the largest of the corners, and in squares with them the stated one of interpolation, SAFE times the sum of
-|da| + k |dL| |a| and NOISE times (sum |a|^2)^(1/2).
+d being that error, A the accuracy asked for. All sheets of the cell's own node go over into one of each other node of
+the stencil, and its corners have no others: none begins or ends. What fails at all levels is computed. Errors are the
+largest of the corners, and in squares with them the stated one of interpolation, SAFE times the sum of |da| + k |dL|
+|a| and NOISE times (sum |a|^2)^(1/2).
 
-Also here: nodes of a lattice: their results and their sheets, and the sheets of neighbours that go over into each
-other.
+Sheets of neighbouring nodes go over into each other that are nearest to each other, both ways.
 
-Also here: which sheet of a node is which of its neighbour: sheets that are nearest to each other, both ways.
-
-A sheet has a chain if it can be followed over all nodes of a stencil; in two dimensions along the first axis and then
-the second, and to the same sheet the other way round.
-
-Sources: Derivations, F23.
+Sources: [AS64, sec. 25.2]; Derivations, F23.
 """
 
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -35,32 +35,55 @@ from creeping.field.waves.strip_waves import isolated, sheets_of
 from creeping.geometry.surface import Surface
 from creeping.rays.transport import Flow
 from creeping.shadow.status import FOLLOWED, OK
-from creeping.sweeping.between.stencil import (
-    BASE,
-    NODES,
-    around,
-    by_cell,
-    corner_weights,
-    corners,
-    offsets,
-    totals,
-    weights,
-)
 from creeping.sweeping.lattice import FINER, Lattice
 from creeping.sweeping.request import LINE, SHARES, VALID, SweepRequest
-from creeping.sweeping.solved_fields import FieldArrays
-from creeping.sweeping.sweeper import Arrays, Sweeper
+from creeping.sweeping.sweeper import Arrays, FieldArrays, Passed, Sweeper
 
+NODES = np.arange(-2, 4)
+"""Of a stencil, from its cell's own on."""
+BASE = 2
+"""Place of the cell's own node, x = 0, among them."""
 MOST_NODES = 20_000
 """Nodes that are kept from one call to the next."""
 SAFE, NOISE = 2.0, 1e-5
-"""Stated error over that of `stencil`, and what the flow and the searches for rays leave, over the sheets' sizes; both
+"""Stated error over the differences, and what the flow and the searches for rays leave, over the sheets' sizes; both
 set on six bodies."""
 OF_CREEPING = 10.0
 """Error allowed to the creeping part, of its own size, over that allowed to the whole field."""
-
 NEAR = 12.0
 """Largest distance of neighbouring sheets, in body sizes and steps of the lattice."""
+
+
+def weights(places: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Weights (n, 6) of the nodes of a stencil for places (n,) in its cell, and those of its errors (4, n, 6).
+
+    Examples
+    --------
+    >>> six, errors = weights(np.array([0.25]))
+    >>> bool(np.isclose((six @ NODES.astype(float) ** 5)[0], 0.25**5))
+    True
+    >>> [bool(np.isclose((one @ NODES.astype(float) ** 3)[0], 0)) for one in errors]
+    [True, True, True, True]
+    """
+    six = _lagrange(places, slice(0, 6))
+    fewer = [_lagrange(places, some) for some in (slice(0, 5), slice(1, 6), slice(1, 5), slice(0, 4), slice(2, 6))]
+    return six, np.stack([*(six - one for one in fewer[:3]), fewer[3] - fewer[4]])
+
+
+def _lagrange(place: FloatArray, some: slice) -> FloatArray:
+    """Weights (n, 6) of some of the nodes, 0 of the others."""
+    out, nodes = np.zeros((len(place), len(NODES))), NODES[some]
+    for j, own in zip(range(len(NODES))[some], nodes, strict=True):
+        out[:, j] = np.prod([(place - other) / (own - other) for other in nodes if other != own], axis=0)
+    return out
+
+
+def totals(values: FloatArray) -> FloatArray:
+    """Sums (n,) of rows (m, n), one after the other."""
+    out: FloatArray = values[0]
+    for row in values[1:]:
+        out = out + row
+    return out
 
 
 def links(
@@ -108,39 +131,15 @@ def _is_least(group: IntArray, value: FloatArray) -> BoolArray:
     return least
 
 
-def chains(start: IntArray, after: list[IntArray], before: list[IntArray], base: int, count: int) -> IntArray:
-    """Sheets at the nodes of the stencils around those of ``start``: (n, count^dimensions), -1 where one is lost.
-
-    Parameters
-    ----------
-    start : (n,)
-        Sheets of the node at place ``base`` along each axis.
-    after, before : list of (sheets,)
-        Of `links`, for each axis.
-    base, count : int
-        Places along an axis: that of the start, and how many.
-    """
-    found = start[:, None]
-    for one, other in zip(after, before, strict=True):
-        found = _along(found, one, other, base, count)
-    if len(after) == 2:
-        crossed = start[:, None]
-        for one, other in zip(after[::-1], before[::-1], strict=True):
-            crossed = _along(crossed, one, other, base, count)
-        turned = crossed.reshape(len(start), count, count).swapaxes(1, 2).reshape(found.shape)
-        found = np.where(found == turned, found, -1)
-    return found
-
-
-def _along(sheets: IntArray, after: IntArray, before: IntArray, base: int, count: int) -> IntArray:
-    """Each sheet (n, m) followed along one axis: (n, m count)."""
-    out = np.empty((*sheets.shape, count), dtype=np.int64)
-    out[..., base] = sheets
-    for place in range(base + 1, count):
-        out[..., place] = np.where(out[..., place - 1] >= 0, after[out[..., place - 1]], -1)
-    for place in range(base - 1, -1, -1):
-        out[..., place] = np.where(out[..., place + 1] >= 0, before[out[..., place + 1]], -1)
-    return out.reshape(len(sheets), sheets.shape[1] * count)
+def chains(start: IntArray, after: IntArray, before: IntArray) -> IntArray:
+    """Sheets (n, 6) at the nodes of the stencil around that of ``start`` (n,), -1 where one is lost; see `links`."""
+    out = np.empty((len(start), len(NODES)), dtype=np.int64)
+    out[:, BASE] = start
+    for place in range(BASE + 1, len(NODES)):
+        out[:, place] = np.where(out[:, place - 1] >= 0, after[out[:, place - 1]], -1)
+    for place in range(BASE - 1, -1, -1):
+        out[:, place] = np.where(out[:, place + 1] >= 0, before[out[:, place + 1]], -1)
+    return out
 
 
 class Cells(NamedTuple):
@@ -148,9 +147,9 @@ class Cells(NamedTuple):
 
     Attributes
     ----------
-    stencil : (cells, 6^dimensions) of int
+    stencil : (cells, 6) of int
         Nodes of each cell.
-    chains : list of (n, 6^dimensions) or None
+    chains : list of (n, 6) or None
         Of each cell its sheets at all nodes; None where a node has no field that is the sum of its sheets, or sheets
         begin or end.
     """
@@ -181,7 +180,7 @@ class Nodes:
 
     def __init__(self, sweeper: Sweeper, lattice: Lattice) -> None:
         self._sweeper, self._lattice = sweeper, lattice
-        self._known: dict[tuple[int, ...], int] = {}
+        self._known: dict[int, int] = {}
         self.results: Arrays = sweeper.request.empty(0)
         # whether the field of a node is that of its sheets, the first of these, and how many there are
         self._whole = np.zeros(0, dtype=bool)
@@ -194,36 +193,30 @@ class Nodes:
         return len(self._known)
 
     def cells(self, level: int, own: IntArray) -> Cells:
-        """Cells of a level, (n, 1 + dimensions) the face and the number of their own node."""
+        """Cells of a level by the numbers of their own nodes (n,)."""
         lattice = self._lattice
-        steps = offsets(lattice.dimensions)
-        numbers = lattice.wrapped(around(own).reshape(-1, own.shape[1]), level)
-        numbers, place = np.unique(numbers, axis=0, return_inverse=True)
+        numbers, place = np.unique(lattice.wrapped(own[:, None] + NODES, level), return_inverse=True)
         nodes = self._at(level, numbers)
         stencil = nodes[place.reshape(len(own), -1)]
-        both = [
-            links(self._begin, self._count, self.label, self._key, nodes[pairs], lattice.spacing(level))
-            for pairs in _neighbours(lattice, level, numbers)
-        ]
-        after, before = [one for one, _ in both], [other for _, other in both]
-        base = np.flatnonzero(np.all(steps == 0, axis=1))[0]
-        counts = self._count[stencil[:, corners(lattice.dimensions)]]
+        at = np.searchsorted(numbers, lattice.wrapped(numbers + 1, level)) % len(numbers)
+        there = numbers[at] == lattice.wrapped(numbers + 1, level)
+        pairs = np.stack([nodes, nodes[at]], axis=1)[there]
+        after, before = links(self._begin, self._count, self.label, self._key, pairs, lattice.spacing(level))
+        counts = self._count[stencil[:, BASE : BASE + 2]]
         curves = self.results["curves"][stencil]
-        served = np.all(self._whole[stencil], axis=1) & np.all(counts == counts[:, :1], axis=1)
+        served = np.all(self._whole[stencil], axis=1) & (counts[:, 0] == counts[:, 1])
         served &= np.all(curves == curves[:, :1], axis=1)
         found: list[IntArray | None] = [None] * len(own)
         for cell in np.flatnonzero(served):
-            first = self._begin[stencil[cell, base]]
-            chain = chains(np.arange(first, first + counts[cell, 0]), after, before, BASE, len(NODES))
+            first = self._begin[stencil[cell, BASE]]
+            chain = chains(np.arange(first, first + counts[cell, 0]), after, before)
             if np.all(chain >= 0):
                 found[cell] = chain
         return Cells(stencil, found)
 
     def _at(self, level: int, numbers: IntArray) -> IntArray:
-        """Nodes of a level by their numbers (n, 1 + dimensions): (n,)."""
-        finest = numbers.copy()
-        finest[:, 1:] *= FINER ** (self._lattice.levels - 1 - level)
-        keys = list(map(tuple, finest.tolist()))
+        """Nodes of a level by their numbers (n,): (n,)."""
+        keys = (numbers * FINER ** (self._lattice.levels - 1 - level)).tolist()
         new = [row for row, key in enumerate(keys) if key not in self._known]
         if new:
             first = len(self._known)
@@ -254,19 +247,6 @@ class Nodes:
             self.label, self._key = np.concatenate([self.label, *label]), np.concatenate([self._key, *key])
             self.path = np.concatenate([self.path, *path])
             self.amplitudes = np.concatenate([*([] if self.amplitudes is None else [self.amplitudes]), *amplitudes])
-
-
-def _neighbours(lattice: Lattice, level: int, nodes: IntArray) -> list[IntArray]:
-    """Pairs (n, 2) of nodes and their next ones along each axis."""
-    places = {tuple(node): number for number, node in enumerate(nodes.tolist())}
-    found = []
-    for axis in range(1, nodes.shape[1]):
-        moved = nodes.copy()
-        moved[:, axis] += 1
-        after = [places.get(tuple(node), -1) for node in lattice.wrapped(moved, level).tolist()]
-        pairs = np.stack([np.arange(len(nodes)), np.array(after, dtype=np.int64)], axis=1)
-        found.append(pairs[pairs[:, 1] >= 0])
-    return found
 
 
 class Problem(NamedTuple):
@@ -305,6 +285,8 @@ class FieldsBetween:
     def __init__(self, flow: Flow, request: SweepRequest) -> None:
         assert request.lattice is not None and request.accuracy is not None
         self.flow, self.request = flow, request
+        self.passed: Passed = lambda _: None
+        self.store: Path | None = None
         self._lattice, self._accuracy = request.lattice, request.accuracy
         self._direct = Sweeper(flow, request)
         self._plain = Sweeper(flow, replace(request, method="rays"))
@@ -326,21 +308,20 @@ class FieldsBetween:
         out, left = self.request.empty(len(incidences)), np.arange(len(incidences))
         if len(self._nodes) > MOST_NODES:
             self._nodes = Nodes(self._plain, self._lattice)
-        for level in range(self._lattice.first, self._lattice.levels):
+        for level in range(self._lattice.levels):
             if len(left):
-                left = left[self._level(level, incidences, left, out) == 1]
+                left = left[~self._level(level, incidences[left], left, out)]
         if len(left):
             for name, values in self._direct(incidences[left]).items():
                 out[name][left] = values
         return out
 
-    def left(self, level: int, incidences: FloatArray) -> FloatArray:
-        """Share of each of the incidences (n, 3) that a level leaves to be computed, 1 of what it does not give."""
-        return self._level(level, incidences, np.arange(len(incidences)), self.request.empty(len(incidences)))
-
-    def _level(self, level: int, incidences: FloatArray, rows: IntArray, out: Arrays) -> FloatArray:
+    def _level(self, level: int, incidences: FloatArray, rows: IntArray, out: Arrays) -> BoolArray:
+        """Fill the rows (n,) of incidences (n, 3) that a level serves: which of them those are (n,)."""
         nodes = self._nodes
-        own, which, members, places = by_cell(self._lattice, level, incidences[rows])
+        number, places = self._lattice.located(incidences, level)
+        own, which = np.unique(number, return_inverse=True)
+        members = np.split(np.argsort(which, kind="stable"), np.cumsum(np.bincount(which))[:-1])
         cells = nodes.cells(level, own)
         six, errors = weights(places)
         stencil = cells.stencil[which]
@@ -354,15 +335,15 @@ class FieldsBetween:
             if chain is None:
                 passed[mine] = False
             else:
-                fields[mine], differences[mine], good = self._summed(nodes, chain, six[mine], [w[mine] for w in errors])
+                fields[mine], differences[mine], good = self._summed(nodes, chain, six[mine], errors[:, mine])
                 passed[mine] &= good
-        inside = stencil[:, corners(self._lattice.dimensions)]
+        inside = stencil[:, BASE : BASE + 2]
         problems = list(self._problems(nodes.results, inside, fields, differences))
         if self.request.method == "auto":
             for problem in problems:
                 passed[FieldArrays(problem.arrays).unclear] = False
         self._write(nodes.results, inside, places, length, problems, rows, passed, out)
-        return np.where(passed, 0.0, 1.0)
+        return np.asarray(passed)
 
     def _write(
         self,
@@ -375,16 +356,16 @@ class FieldsBetween:
         passed: BoolArray,
         out: Arrays,
     ) -> None:
-        """Results of the rows (n,) that have passed, from the corners of their cells (n, 2^dimensions) and the sums."""
+        """Results of the rows (n,) that have passed, from the corners of their cells (n, 2) and the sums."""
         done, some = np.flatnonzero(passed), rows[passed]
         known = {name: results[name][inside[done]] for name in (*LINE, *VALID)}
         out["incidence_status"][some] = np.where(np.any(known["incidence_status"] == FOLLOWED, axis=1), FOLLOWED, OK)
         out["curves"][some], out["line_length"][some] = known["curves"][:, 0], length[done]
         out["line_error"][some] = known["line_error"].max(axis=1)
         out["singular_distance"][some] = known["singular_distance"].min(axis=1)
-        near = corner_weights(places[done])
         for name in SHARES:
-            out[name][some] = totals(near.T * known[name].T)
+            first, second = known[name].T
+            out[name][some] = (1 - places[done]) * first + places[done] * second
         for name, worst in zip(VALID, (np.min, np.max), strict=True):
             out[name][some] = worst(known[name], axis=1)
         out["interpolated"][some] = True
@@ -396,7 +377,7 @@ class FieldsBetween:
                     out[name + problem.suffix][at] = values[done] if self.request.observation else values[done, 0]
 
     def _summed(
-        self, nodes: Nodes, chain: IntArray, six: FloatArray, errors: list[FloatArray]
+        self, nodes: Nodes, chain: IntArray, six: FloatArray, errors: FloatArray
     ) -> tuple[Any, FloatArray, BoolArray]:
         """Fields (n, m, 2, columns) of reflected and of creeping sheets, their differences, and who passes (n,)."""
         from creeping.sweeping.kernels.sheet_sums import ERROR, IMAGINARY, REAL, SIZE, SQUARE, SUMS, sheet_sums
@@ -405,7 +386,7 @@ class FieldsBetween:
         sheets, label = amplitudes[chain], nodes.label[chain[:, 0]]
         parts = np.stack([sheets.real, sheets.imag], axis=2)
         out = np.zeros((len(six), 2 * self._many, SUMS, len(k)))
-        sheet_sums(parts, nodes.path[chain], label, six, np.stack(errors), k, out)
+        sheet_sums(parts, nodes.path[chain], label, six, np.ascontiguousarray(errors), k, out)
         out = out.reshape(len(six), self._many, 2, SUMS, len(k))
         fields = out[..., REAL, :] + 1j * out[..., IMAGINARY, :]
         differences, squares, sizes = (out[..., which, :] for which in (ERROR, SQUARE, SIZE))

@@ -1,8 +1,6 @@
 """Stores of sweeps: what is marked is whole, what is damaged is found, and what belongs elsewhere is refused."""
 
 import errno
-import json
-import shutil
 
 import fake_sweeps as fake
 import numpy as np
@@ -13,13 +11,11 @@ from filelock import FileLock
 
 import creeping as cr
 from creeping.shadow.status import FAILED
-from creeping.storage.folder import content_digest
 from creeping.sweeping.plan import SweepPlan
 from creeping.sweeping.request import sweep_request
 from creeping.sweeping.results import as_dataset, without_complex
 from creeping.sweeping.run import fill, in_memory, open_store
-from creeping.sweeping.storage.layout import write_empty
-from creeping.sweeping.storage.store import SweepStore
+from creeping.sweeping.store import SweepStore
 
 
 def filled(folder, **options):
@@ -72,30 +68,6 @@ def test_coordinates_and_units_are_those_of_memory(tmp_path, quantity):
     with xarray.open_dataset(tmp_path / "s.nc", engine="h5netcdf") as plain:
         assert plain.line_length.attrs["units"] == "m"
         assert quantity == "rays" or plain.field.unit == "m"
-
-
-def test_stores_from_before_units_open_and_are_mended(tmp_path):
-    plan = SweepPlan(METRIC, fake.REQUEST, cr.fibonacci_directions(6), 2, make=fake.FakeSweeper)
-    folder = tmp_path / "s.zarr"
-    SweepStore.create(folder, plan)
-    write_empty(tmp_path / "old", plan, "L")
-    shutil.copytree(folder / "study", tmp_path / "old/study", ignore=lambda *_: {"zarr.json"}, dirs_exist_ok=True)
-    shutil.rmtree(folder)
-    (tmp_path / "old").rename(folder)
-    study = json.loads((folder / "study/zarr.json").read_text())
-    content = study["attributes"]["content"]
-    assert content.pop("unit") == "L"
-    study["attributes"]["blake2b"] = content_digest(content)
-    (folder / "study/zarr.json").write_text(json.dumps(study))
-    assert SweepStore.open(folder).dataset().line_length.attrs["units"] == "L"
-    (folder / "creeping/zarr.json").write_text("{}")
-    with pytest.raises(cr.CreepingError, match="damaged or missing"):
-        SweepStore.open(folder)
-    store = open_store(plan, folder, resume=True)
-    fill(plan, store)
-    ds = store.dataset()
-    assert ds.creeping.attrs["units"] == "L" and ds.field.unit == "L"
-    assert np.array_equal(ds["creeping"].values, fake.creeping_of(6))
 
 
 def test_the_flow_is_kept(tmp_path):

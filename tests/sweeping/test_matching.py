@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from creeping.sweeping.between.fields import chains, links
+from creeping.sweeping.between import chains, links
 
 
 def made(keys, labels=None):
@@ -24,18 +24,7 @@ def test_the_nearest_both_ways_is_taken_and_none_twice():
     assert after.tolist() == [-1, 2, -1]
 
 
-def test_chains_around_a_point_must_close():
-    # two sheets that change places on the way round: nodes (0, 0), (0, 1), (1, 0), (1, 1), two sheets each
-    straight = np.array([2, 3, -1, -1, 6, 7, -1, -1])
-    along = np.array([4, 5, 6, 7, -1, -1, -1, -1])
-    turned = np.array([4, 5, 7, 6, -1, -1, -1, -1])
-
-    def inverse(after):
-        before = np.full(8, -1)
-        before[after[after >= 0]] = np.flatnonzero(after >= 0)
-        return before
-
-    for first, whole in ((along, True), (turned, False)):
-        both = [first, straight], [inverse(first), inverse(straight)]
-        found = chains(np.array([0, 1]), *both, 0, 2)
-        assert np.all(found >= 0) == whole
+def test_a_chain_is_followed_both_ways_until_a_sheet_ends():
+    after, before = made([[0.0], [0.1, 3.0], [0.2, 3.1], [0.3, 3.2], [0.4, 3.3], [0.5]])
+    # the second sheet of the third node has none at the ends
+    assert chains(np.array([3, 4]), after, before).tolist() == [[0, 1, 3, 5, 7, 9], [-1, 2, 4, 6, 8, -1]]

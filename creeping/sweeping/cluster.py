@@ -8,13 +8,14 @@ Also here: what runs on the workers of a cluster: the recipe of a sweep, and the
 """
 
 import os
-import queue
 import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 
 import dask
@@ -24,11 +25,10 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.errors import CreepingError
 from creeping.geometry.surface import Surface
+from creeping.sweeping.layout import UNDONE
 from creeping.sweeping.plan import Arrays, FirstTaskGuard, Maker, SweepPlan, common_error, compute
 from creeping.sweeping.request import SweepRequest
-from creeping.sweeping.storage.layout import UNDONE
-from creeping.sweeping.storage.store import SweepStore
-from creeping.sweeping.t_matrix_fields import TMatrixSweeper
+from creeping.sweeping.store import SweepStore
 
 AHEAD = 2
 """Tasks in flight for each thread of the workers."""
@@ -72,11 +72,10 @@ def fill_on(
         client.register_plugin(RecipePlugin(recipe), name=name)
     except (TypeError, AttributeError) as error:
         raise CreepingError(f"{plan.body!r} cannot be sent to workers ({error}); sweep in one process") from error
-    window = _Window(client, plan, stop)
+    dead = []
+    status, guard = store.status(), FirstTaskGuard()
     try:
-        dead = []
-        status, guard = store.status(), FirstTaskGuard()
-        for task, outcome in window.results(missing):
+        for task, outcome in _outcomes(client, plan, whole_task, ((task, plan.rows(task)) for task in missing), stop):
             if isinstance(outcome, distributed.KilledWorker):
                 dead.append(task)
                 continue
@@ -87,16 +86,13 @@ def fill_on(
             if status[task] == UNDONE:
                 guard.add(store.rows(task).stop - store.rows(task).start, common)
         for task in dead:
-            if stop():
-                return
-            found = _singly(window, plan.rows(task), stop)
+            found = _singly(client, plan, plan.rows(task), stop)
             if found is None:
                 return
             store.write_task(task, *found)
             store.commit(task, failures=bool(found[1]))
             yield task
     finally:
-        window.close()
         with suppress(Exception):
             client.unregister_worker_plugin(name)
 
@@ -170,117 +166,95 @@ def local_client(workers: int) -> Iterator[Any]:
         yield client
 
 
-class _Window:
-    """Tasks in flight: never more than a few for each thread of the workers."""
+def _outcomes(
+    client: Any,
+    plan: SweepPlan,
+    work: Callable[..., Any],
+    parts: Iterator[tuple[int, slice]],
+    stop: Callable[[], bool],
+    most: int | None = None,
+) -> Iterator[tuple[int, Any]]:
+    """What ``work`` gives of numbered parts of the incidences, or the `KilledWorker`, in the order of completion.
 
-    def __init__(self, client: Any, plan: SweepPlan, stop: Callable[[], bool]) -> None:
-        self.client, self.plan, self.stop = client, plan, stop
-        self.finished: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self.flying: dict[str, tuple[int, Any]] = {}
-        self._threads, self._asked, self._alive = 0, 0.0, time.monotonic()
-
-    def results(self, tasks: list[int]) -> Iterator[tuple[int, Any]]:
-        """Task and what `whole_task` says of it, or the `KilledWorker`, in the order of completion."""
-        waiting = iter(tasks)
-        drained = False
+    Never more than a few for each thread of the workers are in flight, nor more than ``most``.
+    """
+    flying: dict[Any, int] = {}
+    stopping, alive = False, time.monotonic()
+    try:
         while True:
-            stopping = self.stop()
-            while not stopping and len(self.flying) < self._width():
-                task = next(waiting, None)
-                if task is None:
-                    break
-                self.submit(task, whole_task, task, self.plan.incidences[self.plan.rows(task)])
-            if stopping and not drained:
-                self._drop_what_waits()
-                drained = True
-            if not self.flying:
+            if stop() and not stopping:
+                stopping = True
+                _drop_what_waits(client, flying)
+            threads = sum(client.nthreads().values())
+            room = max(0, (most or AHEAD * max(1, threads)) - len(flying))
+            for number, rows in islice(parts, 0 if stopping else room):
+                key = f"creeping-{number}-{os.urandom(6).hex()}"
+                future = client.submit(work, plan.digest, plan.incidences[rows], number, key=key, pure=False)
+                flying[future] = number
+            if not flying:
                 return
-            done = self.next()
-            if done is not None:
-                yield done
-
-    def submit(self, task: int, work: Callable[..., Any], *arguments: Any) -> None:
-        """Send work to the cluster."""
-        key = f"creeping-{task}-{os.urandom(6).hex()}"
-        future = self.client.submit(work, self.plan.digest, *arguments, key=key, pure=False)
-        self.flying[key] = (task, future)
-        future.add_done_callback(self.finished.put)
-
-    def next(self) -> tuple[int, Any] | None:
-        """Outcome of what is finished next; None if nothing was for a second."""
-        try:
-            future = self.finished.get(timeout=1.0)
-        except queue.Empty:
-            self._require_workers()
-            return None
-        if future.key not in self.flying:
-            return None
-        task, _ = self.flying.pop(future.key)
-        if future.status == "finished":
-            return task, future.result()
-        if future.status != "error":
-            raise CreepingError(
-                f"the cluster gave up task {task} ({future.status}); see to its scheduler; what is done is kept: resume"
-            )
-        error = future.exception()
-        if isinstance(error, distributed.KilledWorker):
-            return task, error
-        if isinstance(error, CreepingError):
-            raise error
+            alive = time.monotonic() if threads else alive
+            if time.monotonic() - alive > PATIENCE:
+                raise CreepingError(
+                    f"the cluster has had no worker for {PATIENCE:.0f} s; start workers; what is done is kept: resume"
+                )
+            done: Any = ()
+            # a second without an outcome is no failure
+            with client.as_current(), suppress(TimeoutError):
+                done = distributed.wait(list(flying), timeout=1.0, return_when="FIRST_COMPLETED").done
+            for future in done:
+                yield flying.pop(future), _outcome(future)
+    except CancelledError as error:
         raise CreepingError(
-            f"task {task} failed on its worker ({type(error).__name__}: {error}); what is done is kept: resume"
+            f"the cluster gave up a task ({error}); see to its scheduler; what is done is kept: resume"
         ) from error
-
-    def close(self) -> None:
-        """Cancel what is in flight."""
-        futures = [future for _, future in self.flying.values()]
-        self.flying.clear()
+    finally:
         with suppress(Exception):
-            self.client.cancel(futures, force=True)
-
-    def _drop_what_waits(self) -> None:
-        """Cancel tasks that no worker has begun."""
-        # stacks of all that runs, asked without names: a scheduler fails over the name of a task that ended meanwhile
-        busy = {key for stacks in self.client.call_stack().values() for key in stacks} if self.flying else set()
-        idle = [key for key, (_, future) in self.flying.items() if key not in busy and not future.done()]
-        dropped = [self.flying.pop(key)[1] for key in idle]
-        self.client.cancel(dropped, force=True)
-
-    def _width(self) -> int:
-        if time.monotonic() - self._asked > 2.0:
-            self._threads, self._asked = sum(self.client.nthreads().values()), time.monotonic()
-        return AHEAD * max(1, self._threads)
-
-    def _require_workers(self) -> None:
-        if self.client.nthreads():
-            self._alive = time.monotonic()
-        elif time.monotonic() - self._alive > PATIENCE:
-            raise CreepingError(
-                f"the cluster has had no worker for {PATIENCE:.0f} s; start workers; what is done is kept: resume"
-            )
+            client.cancel(list(flying), force=True)
 
 
-def _singly(window: _Window, rows: slice, stop: Callable[[], bool]) -> tuple[Arrays, dict[int, str]] | None:
+def _outcome(future: Any) -> Any:
+    """Result of a future that is finished, or the `KilledWorker`; other errors are raised."""
+    error = future.exception()
+    if error is None:
+        return future.result()
+    if isinstance(error, distributed.KilledWorker):
+        return error
+    if isinstance(error, CreepingError):
+        raise error
+    raise CreepingError(
+        f"a task failed on its worker ({type(error).__name__}: {error}); what is done is kept: resume"
+    ) from error
+
+
+def _drop_what_waits(client: Any, flying: dict[Any, int]) -> None:
+    """Cancel tasks that no worker has begun."""
+    # stacks of all that runs, asked without names: a scheduler fails over the name of a task that ended meanwhile
+    busy = {key for stacks in client.call_stack().values() for key in stacks} if flying else set()
+    idle = [future for future in flying if future.key not in busy and not future.done()]
+    for future in idle:
+        flying.pop(future)
+    client.cancel(idle, force=True)
+
+
+def _singly(
+    client: Any, plan: SweepPlan, rows: slice, stop: Callable[[], bool]
+) -> tuple[Arrays, dict[int, str]] | None:
     """Results of incidences, one after the other with nothing else on the cluster; None if stopped."""
-    request, incidences = window.plan.request, window.plan.incidences
-    arrays, errors = request.empty(rows.stop - rows.start), dict[int, str]()
-    for row in range(rows.start, rows.stop):
-        if stop():
-            return None
-        place = row - rows.start
-        window.submit(row, one_incidence, incidences[row : row + 1])
-        outcome = None
-        while outcome is None:
-            outcome = window.next()
-        if isinstance(outcome[1], Exception):
+    arrays, errors = plan.request.empty(rows.stop - rows.start), dict[int, str]()
+    each = ((row, slice(row, row + 1)) for row in range(rows.start, rows.stop))
+    done = 0
+    for row, outcome in _outcomes(client, plan, one_incidence, each, stop, most=1):
+        place, done = row - rows.start, done + 1
+        if isinstance(outcome, Exception):
             errors[place] = "its worker died each time it was tried"
             continue
-        found, failed = outcome[1]
+        found, failed = outcome
         for name, values in arrays.items():
             values[place] = found[name][0]
         if failed:
             errors[place] = failed[0]
-    return arrays, errors
+    return (arrays, errors) if done == rows.stop - rows.start else None
 
 
 @dataclass
@@ -306,11 +280,9 @@ class Recipe:
         if not hasattr(self.own, "tools"):
             if not Path(self.folder).is_dir():
                 raise CreepingError(f"the worker on {process()[0]} does not see {self.folder}; give a shared folder")
-            # the driver has mended it
-            store = SweepStore.open(self.folder, mending=True)
+            store = SweepStore.open(self.folder)
             sweeper = self.make(store.flow(self.body), self.request)
-            if isinstance(sweeper, TMatrixSweeper):
-                sweeper.store = store.matrices
+            sweeper.store = store.matrices
             self.own.tools = (sweeper, store)
         tools: tuple[Any, SweepStore] = self.own.tools
         return tools
@@ -348,7 +320,7 @@ class RecipePlugin(distributed.WorkerPlugin):  # type: ignore[misc]
         _RECIPES.pop(self.recipe.digest, None)
 
 
-def whole_task(digest: str, task: int, incidences: FloatArray) -> tuple[int, str]:
+def whole_task(digest: str, incidences: FloatArray, task: int) -> tuple[int, str]:
     """Compute a task on a worker and write its chunks: how many incidences failed, and their `common_error`."""
     sweeper, store = _RECIPES[digest].tools()
     arrays, errors = compute(sweeper, np.asarray(incidences))
@@ -356,7 +328,7 @@ def whole_task(digest: str, task: int, incidences: FloatArray) -> tuple[int, str
     return len(errors), common_error(errors, len(incidences))
 
 
-def one_incidence(digest: str, incidence: FloatArray) -> tuple[Arrays, dict[int, str]]:
+def one_incidence(digest: str, incidence: FloatArray, _: int) -> tuple[Arrays, dict[int, str]]:
     """Compute one incidence on a worker."""
     return compute(_RECIPES[digest].tools()[0], np.asarray(incidence))
 

@@ -11,9 +11,9 @@ import pytest
 from creeping import CreepingError
 from creeping.geometry.directions import fibonacci_directions
 from creeping.shadow.status import FAILED
-from creeping.sweeping.cluster import driver as cluster
+from creeping.sweeping import cluster
 from creeping.sweeping.run import fill
-from creeping.sweeping.storage.store import SweepStore
+from creeping.sweeping.store import SweepStore
 
 
 @pytest.fixture(scope="module")
@@ -94,14 +94,13 @@ def test_stopping_keeps_what_is_done(two, tmp_path):
 
 
 def test_stopping_bears_a_task_that_the_scheduler_has_forgotten(two):
-    window = cluster._Window(two, fake.plan(4, 2), lambda: True)
-    window.submit(0, len)
-    ((key, (_, future)),) = window.flying.items()
+    future = two.submit(len, "", pure=False)
+    flying = {future: 0}
     # as where it ended between the question and the answer
     two.cancel([future], force=True)
-    two.run_on_scheduler(_forgets, key)
-    window._drop_what_waits()
-    assert not window.flying or all(future.done() for _, future in window.flying.values())
+    two.run_on_scheduler(_forgets, future.key)
+    cluster._drop_what_waits(two, flying)
+    assert not flying or all(one.done() for one in flying)
 
 
 async def _forgets(key, dask_scheduler):

@@ -6,9 +6,9 @@ import pytest
 from creeping.sweeping.kernels.sheet_sums import ERROR, IMAGINARY, REAL, SIZE, SQUARE, SUMS, sheet_sums
 
 
-@pytest.mark.parametrize("nodes", [6, 36])
 @pytest.mark.parametrize("columns", [1, 5, 16])
-def test_sums_are_those_of_the_plain_formulas_in_any_company(columns, nodes):
+def test_sums_are_those_of_the_plain_formulas_in_any_company(columns):
+    nodes = 6
     rng = np.random.default_rng(columns)
     a = rng.normal(size=(4, nodes, columns)) + 1j * rng.normal(size=(4, nodes, columns))
     paths, label = rng.normal(size=(4, nodes)), np.array([0, 1, 1, 3])

@@ -1,1 +1,0 @@
-"""Results between incidences, interpolated where that is known to be good enough."""

@@ -1,0 +1,153 @@
+"""Layout of a store of results on disk: its arrays, made with nothing in them, and the group that holds its study.
+
+All of it follows from the plan, and is written anew from it where it is damaged, if that gives the same bytes.
+"""
+
+import hashlib
+import json
+import shutil
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from creeping._typing import Any
+from creeping.errors import CreepingError
+from creeping.geometry.checks import unit_of
+from creeping.storage.atomic import written_aside
+from creeping.storage.folder import content_digest
+from creeping.storage.reading import bytes_of
+from creeping.sweeping.plan import SweepPlan
+from creeping.sweeping.results import (
+    MISSING,
+    coordinates,
+    count_attributes,
+    require,
+    sweep_attributes,
+    variable_attributes,
+)
+
+SCHEMA = 3
+ROOT, STUDY = "zarr.json", "study"
+STATUS, ERRORS = "task_status", "incidence_error"
+UNDONE, DONE, WITH_FAILURES = 0, 1, 2
+ERROR_BYTES = 256
+"""Bytes kept of the message of a failed incidence, UTF-8, zeros after it."""
+COORDINATE_CHUNK = 65_536
+MOST_DOCUMENT = 10**9
+"""Bytes of what describes a study, an array or a chunk of coordinates."""
+
+
+@contextmanager
+def aside_of(folder: Path) -> Iterator[Path]:
+    """A new folder beside another, gone afterwards if it is still there.
+
+    Raises
+    ------
+    CreepingError
+        If something cannot be written.
+    """
+    aside = folder.parent / f".{folder.name}-{uuid.uuid4().hex[:12]}"
+    try:
+        aside.mkdir(parents=True)
+        yield aside
+    except OSError as error:
+        raise CreepingError(f"cannot make the store {folder}: {error}; choose another place") from error
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
+
+
+def write_empty(folder: Path, plan: SweepPlan, unit: str | None = None) -> dict[str, Any]:
+    """Write the arrays of a plan without chunks, coordinates and root; what the study is to say of them.
+
+    Lengths are called ``unit``, by default as the body knows it.
+    """
+    zarr = require("zarr")
+    group = zarr.open_group(folder, mode="w", zarr_format=3)
+    request, count, unit = plan.request, len(plan.incidences), unit or unit_of(plan.body)
+    beside = coordinates(request, plan.incidences, unit)
+    for name, (dims, values, words) in beside.items():
+        text = values.dtype.kind == "U"
+        kind = str if text else values.dtype
+        where = _create(group, name, values.shape, kind, dims, words, first=COORDINATE_CHUNK, fill=None)
+        where[:] = values.astype(object) if text else values
+    for name, variable in request.variables.items():
+        shape = (count, *(request.sizes[d] for d in variable.dims))
+        words, dims = variable_attributes(request, name, unit), ("incidence", *variable.dims)
+        _create(group, name, shape, variable.dtype, dims, words, first=plan.chunk, fill=variable.fill)
+    words = {"description": "0 missing, 1 done, 2 done but for failed incidences; written last"}
+    _create(group, STATUS, (plan.tasks,), "int8", ("task",), words, first=1, fill=UNDONE)
+    words = {"description": "why an incidence failed, UTF-8, zeros after it"}
+    _create(group, ERRORS, (count, ERROR_BYTES), "uint8", ("incidence", "character"), words, first=plan.chunk, fill=0)
+    attributes = sweep_attributes(plan, unit)
+    write_root(folder, attributes | count_attributes(np.full(count, MISSING), []), list(beside))
+    return {
+        "schema": SCHEMA,
+        "key": plan.key,
+        "variables": list(request.variables),
+        "coordinates": list(beside),
+        "unit": unit,
+        "attributes": attributes,
+        "unchanging": unchanging_digest(folder, list(beside)),
+    }
+
+
+def _create(
+    group: Any,
+    name: str,
+    shape: tuple[int, ...],
+    dtype: Any,
+    dims: Any,
+    words: dict[str, Any],
+    *,
+    first: int,
+    fill: Any,
+) -> Any:
+    """Array with chunks that are whole but along the first axis."""
+    from zarr.codecs import Crc32cCodec, ZstdCodec
+
+    return group.create_array(
+        name,
+        shape=shape,
+        dtype=dtype,
+        chunks=(min(first, shape[0]), *shape[1:]),
+        dimension_names=dims,
+        attributes=words,
+        compressors=[ZstdCodec(level=1), Crc32cCodec()],
+        **({} if fill is None else {"fill_value": fill}),
+    )
+
+
+def write_root(folder: Path, attributes: dict[str, Any], beside: list[str]) -> None:
+    """Describe the folder, as xarray does: which arrays are coordinates."""
+    _write_group(folder, attributes | {"coordinates": " ".join(beside)})
+
+
+def write_study(folder: Path, content: dict[str, Any]) -> None:
+    """Write what a new folder says of its study, with its digest."""
+    (folder / STUDY).mkdir()
+    _write_group(folder / STUDY, {"content": content, "blake2b": content_digest(content)})
+
+
+def _write_group(folder: Path, attributes: dict[str, Any]) -> None:
+    with written_aside(folder / ROOT) as aside:
+        aside.write_text(json.dumps({"attributes": attributes, "zarr_format": 3, "node_type": "group"}))
+
+
+def unchanging_digest(folder: Path, beside: list[str]) -> str:
+    """Digest of what describes the arrays, and of the coordinates ``beside`` them: names and bytes of the files.
+
+    Raises
+    ------
+    OSError
+        If one cannot be read.
+    """
+    files = [path for path in folder.glob(f"*/{ROOT}") if path.parent.name != STUDY]
+    files += [path for name in beside for path in folder.glob(f"{name}/c/**/*") if path.is_file()]
+    found = {
+        path.relative_to(folder).as_posix(): hashlib.blake2b(bytes_of(path, MOST_DOCUMENT)).hexdigest()
+        for path in files
+    }
+    return content_digest(found)
