@@ -258,6 +258,8 @@ def summary_of(body: str, request: EchoRequest, echo: Echo, dataset: Any) -> dic
     """What the summary file holds."""
     all_values = (dataset[name].values for name in ("least_k_rho", "largest_transverse"))
     least, largest = (values[np.isfinite(values)] for values in all_values)
+    total = dataset.field.total
+    none = total.isnull().all([name for name in total.dims if name != "incidence"]).values
     return {
         "body": body,
         "version": __version__,
@@ -268,7 +270,7 @@ def summary_of(body: str, request: EchoRequest, echo: Echo, dataset: Any) -> dic
             "least_k_rho": float(least.min()) if least.size else None,
             "largest_transverse": float(largest.max()) if largest.size else None,
         },
-        "failed_incidences": int(np.sum(np.isin(dataset["incidence_status"].values, (SINGULAR, FAILED)))),
+        "failed_incidences": int(np.sum(none & np.isin(dataset["incidence_status"].values, (SINGULAR, FAILED)))),
         "errors": dataset.attrs.get("errors"),
         "digest": dataset.attrs.get("sweep_digest"),
     }

@@ -13,7 +13,7 @@ INCIDENCE_STATUSES = {
     OK: "ok",
     NEAR_SINGULAR: "near singular: the number of curves is not certain",
     FOLLOWED: "followed one by one: the meshes did not resolve the line",
-    SINGULAR: "singular: the line crosses itself, nothing is given",
+    SINGULAR: "singular: the line crosses itself, and there are no rays",
     FAILED: "failed: an error, nothing is given",
 }
 """Meanings of the codes of incidences."""

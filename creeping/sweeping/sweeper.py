@@ -3,6 +3,7 @@
 Fields are those that `creeping.far_field` has for each incidence. What many incidences have in common is done once:
 
     rays        lines, searches and fans of all incidences together; "auto" takes currents where rays leave one unclear
+    singular    the equation of all incidences whose lines cross themselves, as it needs none
     currents, equation, pieces      each incidence by the dispatcher, the equation solved for all of them before
     no rays     a body of flat triangles, or several: the equation of all incidences
     t-matrix    one matrix for each wavenumber and boundary
@@ -22,7 +23,7 @@ from creeping.errors import InvalidInputError, SingularIncidenceError, SurfaceEr
 from creeping.field.arguments import UNRESOLVED
 from creeping.field.boundary import BoundaryLike, parse_boundary
 from creeping.field.currents.whole_body import far_by_currents
-from creeping.field.equation.solving import POOR, solve_together, solved_alone
+from creeping.field.equation.solving import POOR, solution_for, solve_together, solved_alone
 from creeping.field.far import far_field
 from creeping.field.problem import Problem
 from creeping.field.results.far_result import FarField
@@ -214,7 +215,10 @@ class Sweeper:
         if request.quantity == "rays":
             fill_rays(self.flow, lines, request.travel_times, out)
             return None
-        rows = np.flatnonzero(lines.status != SINGULAR)
+        singular = lines.status == SINGULAR
+        if request.order == 2 and request.method != "rays":
+            self._fill_without_lines(incidences, np.flatnonzero(singular), out)
+        rows = np.flatnonzero(~singular)
         if not len(rows):
             return None
         if self._tracer is not None:
@@ -280,6 +284,18 @@ class Sweeper:
                 for known, value in zip(VALID, field.validity, strict=True):
                     out[known][some, k] = value
             passed(done / len(jobs))
+
+    def _fill_without_lines(self, incidences: FloatArray, rows: IntArray, out: Arrays) -> None:
+        """Fields of incidences whose lines cross themselves, by the equation if it costs little enough; else none."""
+        observers = self._observers(incidences)
+        for case in self._cases() if len(rows) else ():
+            (_, wavenumber), (name, _, _) = case
+            boundary = parse_boundary(name)
+            solve_together(self.body, incidences[rows], wavenumber, boundary)
+            for row in rows:
+                if solved := solution_for(self.body, incidences[row], wavenumber, boundary):
+                    field = solved.solution.far_field(observers[row], solved.incidence)
+                    self._put(out, [row], case, FieldArrays.of(field, 1).arrays)
 
     def _fan(self, direction: FloatArray, line: ShadowLine | None = None) -> RayFan:
         line, request = line or shadow_line(self.body, direction), self.request

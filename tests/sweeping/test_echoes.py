@@ -6,6 +6,7 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.field.results.labelled import power
+from creeping.shadow.status import SINGULAR
 from creeping.sweeping.echoes import echo_of, monostatic_method
 from tests.reference import sphere
 
@@ -135,3 +136,13 @@ def test_a_store_of_echoes_goes_on_and_is_not_written_over(tmp_path, capsys):
         cr.backscatter(sc.Sphere(), store=tmp_path / "s", resume=True, **(asked | {"azimuth": 3.0}))
     with pytest.raises(cr.InvalidInputError, match="resume goes with store="):
         cr.backscatter(sc.Sphere(), resume=True, **asked)
+
+
+def test_lines_that_cross_themselves_leave_their_echoes_to_the_equation():
+    """Every line of a wave in the plane of a torus does: its echo is the same from everywhere there."""
+    ds = cr.backscatter(sc.Torus(1.0, 0.4), wavenumbers=4.0, azimuth=[0.0, 37.0], boundary="hard", cache=False)
+    assert ds["incidence_status"].values.tolist() == [SINGULAR] * 2 and np.all(ds["by_currents"])
+    total, error = ds.field.total.values.squeeze(), ds.field.error.values.squeeze()
+    assert abs(total[0] - total[1]) < error.sum() < 0.01 * abs(total[0])
+    exact = cr.solve(sc.Torus(1.0, 0.4), (-1, 0, 0), wavenumber=4.0, boundary="hard").backscatter()
+    assert abs(total[0] - exact.total[0]) < error[0]
