@@ -147,9 +147,10 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Prog
 def _flow(read: Any, body: Any, request: Any, cache: bool, progress: Any) -> Any:
     from creeping import build_phase_map
     from creeping.geometry.parts import why_no_rays
+    from creeping.sweeping.request import solved_alone
     from creeping.sweeping.sweeper import NoFlow, outputs_of
 
-    if why_no_rays(body):
+    if why_no_rays(body) or solved_alone(body, request, len(read.incidences)):
         return NoFlow(body)
     asked = {"length": request.length, "n_steps": outputs_of(body, request), "cache": cache, "progress": progress}
     rays = len(read.incidences) * request.n_rays

@@ -26,15 +26,17 @@ from creeping.field.boundary import Boundary, BoundaryLike, scalar_boundaries
 from creeping.field.currents.nodes import RAYS, STEPS
 from creeping.field.currents.radiation import grid_cells, may_self_reflect, transformed
 from creeping.field.currents.whole_body import POINTS, SurfaceCurrents
-from creeping.field.equation.effort import expected_seconds_of, too_much
+from creeping.field.equation.effort import expected_seconds_of, plan_of, too_much
 from creeping.field.lit_ground import convex
 from creeping.field.marching.fan_waves import marchable
 from creeping.field.problem import Problem, has_expansions
 from creeping.field.results.point_result import FieldStatus, PointValues
 from creeping.field.waves.beams import seconds as beam_seconds
 from creeping.field.waves.far_geometry import fan_strips
+from creeping.geometry.evaluators import speed_of
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.quadrature import node_count
+from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan
 from creeping.rays.reach import ray_length
 
@@ -226,6 +228,26 @@ def stands_alone(problem: Problem) -> bool:
     """Whether nothing comes to places of the body from elsewhere on it, and expansions are no worse than stated."""
     # an admittance that steps is smeared by expansions, of which their currents tell
     return not is_piecewise(problem.body) and convex(problem.fan) and not problem.kind.varies
+
+
+def by_equation_alone(
+    body: Surface,
+    wavenumbers: FloatArray,
+    boundaries: Sequence[BoundaryLike],
+    incidences: int,
+    *,
+    method: str,
+    order: int = 2,
+) -> bool:
+    """Whether far fields of so many incidences are those of the equation, and rays are needed for none of them.
+
+    Of a body without expansions, at wavenumbers (k,), 1/L, at each of which the equation is solved by itself.
+    """
+    if order != 2 or method not in ("auto", "currents", "equation") or speed_of(body) is not None:
+        return False
+    if any(has_expansions(body, boundary) for boundary in boundaries):
+        return False
+    return not any(plan_of(body, float(k), b, incidences=incidences).refused for k in wavenumbers for b in boundaries)
 
 
 def far_currents(problem: Problem, directions: int) -> SurfaceCurrents | None:

@@ -21,7 +21,7 @@ from creeping.field.arguments import checked, checked_across, checked_method, ch
 from creeping.field.boundary import BoundaryLike
 from creeping.field.equation.solving import is_rough
 from creeping.field.results.echo import Echo
-from creeping.field.routes import expected_seconds
+from creeping.field.routes import by_equation_alone, expected_seconds
 from creeping.field.tmatrix.computing import pays
 from creeping.field.validity_range import is_reached
 from creeping.geodesics.direct_flow import DirectFlow
@@ -39,6 +39,7 @@ from creeping.sweeping.blocks import TASK, Told, sizes_of, stored_flow, stored_s
 from creeping.sweeping.request import AMPLITUDES, METHODS
 from creeping.sweeping.results import SweepFields
 from creeping.sweeping.run import Progress, sweep_directions
+from creeping.sweeping.sweeper import NoFlow
 
 if TYPE_CHECKING:
     import xarray
@@ -260,13 +261,15 @@ def _swept(
             raise InvalidInputError(f"{store} exists; give resume=True to go on with it, or choose another store")
     elif resume:
         raise InvalidInputError("resume goes with store=, the folder of the results")
-    flow: Flow | Surface = body
     options: dict[str, Any] = dict(asked)
-    if not (why_no_rays(body) or asked["method"] == "t-matrix"):
+    flow: Flow | Surface | None = stored_flow(store, body) if store else None
+    if flow is None and (why_no_rays(body) or asked["method"] == "t-matrix"):
+        flow = body
+    elif flow is None and by_equation_alone(body, k, [asked["boundary"]], len(incidences), method=asked["method"]):
+        flow = NoFlow(body)
+    if flow is None or not (flow is body or isinstance(flow, NoFlow)):
         length = body_length(body, float(k.min()))
-        flow = (stored_flow(store, body) if store else None) or choose_flow(
-            body, n_rays=2 * asked["n_rays"] * len(incidences), length=length, cache=cache
-        )
+        flow = flow or choose_flow(body, n_rays=2 * asked["n_rays"] * len(incidences), length=length, cache=cache)
         # small enough that progress is told in time, large enough that a task is not all overhead
         options |= {"chunk": TASK, "length": length}
     with reporting(progress, "incidences") as told:

@@ -13,6 +13,7 @@ from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked, checked_across
 from creeping.field.boundary import BoundaryLike, boundary_name, parse_boundary
+from creeping.field.routes import by_equation_alone
 from creeping.geometry.arguments import real_array
 from creeping.geometry.directions import unit_directions
 from creeping.geometry.evaluators import speed_of
@@ -312,6 +313,16 @@ def sweep_request(
 def with_lattice(request: SweepRequest, incidences: FloatArray) -> SweepRequest:
     """The request with the lattice of unit directions (n, 3), where an accuracy is asked for and a lattice pays."""
     return request if request.accuracy is None else replace(request, lattice=lattice_of(incidences))
+
+
+def solved_alone(body: Surface, request: SweepRequest, incidences: int) -> bool:
+    """Whether the fields that are asked for need no rays: those of a body whose equation alone serves."""
+    if request.quantity == "rays" or request.accuracy is not None:
+        return False
+    checked_across(body, min(request.wavenumbers), max(request.wavenumbers))
+    kinds = [parse_boundary(name) for name in request.boundaries]
+    k = np.array(request.wavenumbers)
+    return by_equation_alone(body, k, kinds, incidences, method=request.method, order=request.order)
 
 
 def sweep_length(body: Surface, length: float | Literal["auto"], wavenumbers: ArrayLike, *, leap: float = 0.0) -> float:

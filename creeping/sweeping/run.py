@@ -6,6 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, cast
@@ -24,7 +25,7 @@ from creeping.rays.transport import Flow, checked_flow
 from creeping.storage.memory import within_budget
 from creeping.sweeping.layout import UNDONE
 from creeping.sweeping.plan import Arrays, FirstTaskGuard, SweepPlan, bytes_of, common_error, compute, task_size
-from creeping.sweeping.request import Quantity, sweep_length, sweep_request, with_lattice
+from creeping.sweeping.request import Quantity, solved_alone, sweep_length, sweep_request, with_lattice
 from creeping.sweeping.results import as_dataset, require
 from creeping.sweeping.store import SweepStore
 from creeping.sweeping.sweeper import NoFlow
@@ -147,9 +148,10 @@ def sweep_directions(
     if boundary is None:
         boundary = () if quantity == "rays" else "soft"
     several: Any = list(boundary) if isinstance(boundary, (list, tuple)) else [boundary]
+    # that of "auto" is not known before rays are, which may not be needed
     request = sweep_request(
         quantity,
-        length=sweep_length(flow.body, length, wavenumbers, leap=flow.horizon if isinstance(flow, PhaseMap) else 0.0),
+        length=1.0 if isinstance(length, str) and length == AUTO else length,
         n_rays=n_rays,
         n_steps=n_steps,
         wavenumbers=wavenumbers,
@@ -162,9 +164,16 @@ def sweep_directions(
     unit = unit_directions(directions, "directions")
     if unit.ndim != 2:
         raise InvalidInputError(f"directions have shape {unit.shape}; give rows of three numbers, shape (n, 3)")
+    going_on = store is not None and resume and Path(store).exists()
+    if going_on:
+        flow = NoFlow(flow.body) if SweepStore.open(str(store)).key["flow"]["kind"] == "none" else flow
+    elif not isinstance(flow, NoFlow) and solved_alone(flow.body, request, len(unit)):
+        flow = NoFlow(flow.body)
+    if not isinstance(flow, NoFlow):
+        leap = flow.horizon if isinstance(flow, PhaseMap) else 0.0
+        request = replace(request, length=sweep_length(flow.body, length, request.wavenumbers, leap=leap))
     request = with_lattice(request, unit)
     chunk = None if chunk is None else whole_number(chunk, "chunk")
-    going_on = store is not None and resume and Path(store).exists()
     chunk = (
         SweepStore.open(str(store)).chunk
         if going_on

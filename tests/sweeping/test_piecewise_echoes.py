@@ -71,4 +71,6 @@ def test_currents_of_a_body_with_edges_are_those_of_its_equation():
     r = np.stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.full(2, np.sin(e))], axis=-1)
     exact = cr.solve(body, (-1, 0, 0), wavenumber=k, boundary="hard").far_field(r)
     assert np.all(ds["by_currents"]) and not np.any(ds.field.unresolved)
+    # nothing is launched that is not needed
+    assert ds.attrs["flow"] == "none"
     np.testing.assert_allclose(ds.field.total.values.squeeze(), exact.total, atol=1e-12)
