@@ -47,7 +47,9 @@ def explore(
     from creeping.errors import CreepingError, InvalidInputError
     from creeping.explorer.frames import step_of, steps_of
     from creeping.explorer.request import ViewRequest, angles
+    from creeping.geometry.arguments import rays_refused
     from creeping.geometry.directions import unit_direction
+    from creeping.geometry.parts import why_no_rays
     from creeping.geometry.surface import size
     from creeping.rays.reach import body_length
 
@@ -61,6 +63,8 @@ def explore(
     except ImportError as error:
         raise CreepingError(f"the page needs viser ({error}); pip install 'creeping[web]'") from error
     shape = parse_body(body, speed, options=file, cache=cache, progress=progress)
+    if why_no_rays(shape):
+        raise InvalidInputError(rays_refused(shape))
     extent = size(shape)
     wavenumber, metres = _wave(wavenumber, frequency, sound_speed, body)
     theta, phi = angles(unit_direction(direction))

@@ -3,6 +3,7 @@
 import re
 
 import pytest
+import trimesh
 
 import creeping as cr
 import scatterers as sc
@@ -82,3 +83,10 @@ def test_the_command_writes_it_and_names_are_titles(tmp_path, capsys):
     page = (tmp_path / "a.html").read_text()
     assert "rays, rms" in capsys.readouterr().out and len(page) > 1e6
     assert caught.value.code == 0 and "<title>sphere</title>" in page and "1 GHz" in page and "dBsm" in page
+
+
+def test_a_body_of_facets_is_refused_in_words(tmp_path, capsys):
+    trimesh.creation.box((1.0, 1.0, 2.0)).export(tmp_path / "box.stl")
+    with pytest.raises(SystemExit) as end:
+        cli.main(["explore", str(tmp_path / "box.stl"), "--units", "m", "--surface", "facets", "--wavenumber", "4"])
+    assert end.value.code == 3 and "no creeping rays on this body" in capsys.readouterr().err
