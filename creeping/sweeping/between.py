@@ -43,8 +43,6 @@ NODES = np.arange(-2, 4)
 """Of a stencil, from its cell's own on."""
 BASE = 2
 """Place of the cell's own node, x = 0, among them."""
-MOST_NODES = 20_000
-"""Nodes that are kept from one call to the next."""
 SAFE, NOISE = 2.0, 1e-5
 """Stated error over the differences, and what the flow and the searches for rays leave, over the sheets' sizes; both
 set on six bodies."""
@@ -306,8 +304,6 @@ class FieldsBetween:
         """Arrays of results of unit directions (n, 3)."""
         incidences = np.asarray(incidences, dtype=float)
         out, left = self.request.empty(len(incidences)), np.arange(len(incidences))
-        if len(self._nodes) > MOST_NODES:
-            self._nodes = Nodes(self._plain, self._lattice)
         for level in range(self._lattice.levels):
             if len(left):
                 left = left[~self._level(level, incidences[left], left, out)]

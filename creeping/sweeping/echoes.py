@@ -35,7 +35,7 @@ from creeping.rays.fan import launch
 from creeping.rays.reach import body_length
 from creeping.rays.transport import Flow
 from creeping.shadow.line import shadow_line
-from creeping.sweeping.blocks import TASK, Told, sizes_of, stored_flow, stored_sizes, sweep_blocks
+from creeping.sweeping.blocks import TASK, Told, begun, sizes_of, sweep_blocks
 from creeping.sweeping.request import AMPLITUDES, METHODS
 from creeping.sweeping.results import SweepFields
 from creeping.sweeping.run import Progress, sweep_directions
@@ -262,18 +262,19 @@ def _swept(
         raise InvalidInputError("resume goes with store=, the folder of the results")
     flow: Flow | Surface = body
     options: dict[str, Any] = dict(asked)
+    known = begun(store) if store else None
     if not (why_no_rays(body) or asked["method"] == "t-matrix"):
         length = body_length(body, float(k.min()))
-        flow = (stored_flow(store, body) if store else None) or choose_flow(
-            body, n_rays=2 * asked["n_rays"] * len(incidences), length=length, cache=cache
-        )
+        rays = 2 * asked["n_rays"] * len(incidences)
+        flow = known.flow(body) if known else choose_flow(body, n_rays=rays, length=length, cache=cache)
         # small enough that progress is told in time, large enough that a task is not all overhead
         options |= {"chunk": TASK, "length": length}
     with reporting(progress, "incidences") as told:
         if store is None:
             return sweep_directions(flow, incidences, wavenumbers=k, progress=told, **options)
         options.pop("chunk", None)
-        sizes = stored_sizes(store) or sizes_of(flow, incidences, k, options)
+        begun_with = known and (len(known.key["request"]["wavenumbers"]), known.chunk)
+        sizes = begun_with or sizes_of(flow, incidences, k, options)
         options |= {"store": store, "resume": resume, "sizes": sizes, "rows": rows}
         return sweep_blocks(flow, incidences, k, progress=told, **options)
 

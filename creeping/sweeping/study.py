@@ -64,10 +64,8 @@ BODY = {
     "units": Key("text"),
     "speed": Key("text"),
 }
-STUDY = (
-    BODY
-    | FILE
-    | {
+TABLES: dict[str, dict[str, Key]] = {
+    "study": {
         "quantity": Key(one_of(*QUANTITIES), "monostatic"),
         "boundary": Key("texts"),
         "wavenumbers_per_length": Key("wavenumbers", ()),
@@ -78,11 +76,10 @@ STUDY = (
         "accuracy": Key("positive"),
         "length": Key("length"),
         "length_in_body_sizes": Key("positive"),
-    }
-)
-FLOW = {"kind": Key(one_of("auto", "map", "direct"), "auto"), "tolerance": Key("positive", 1e-6)}
-RUN = {"chunk": Key(count(1_000_000)), "workers": Key(count(10_000)), "output": Key("text")}
-SETS = ("incidences", "observation")
+    },
+    "flow": {"kind": Key(one_of("auto", "map", "direct"), "auto"), "tolerance": Key("positive", 1e-6)},
+    "run": {"chunk": Key(count(1_000_000)), "workers": Key(count(10_000)), "output": Key("text")},
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +170,7 @@ def parse_study(text: str, *, folder: Path, name: str = "the study") -> Study:
     if not tables:
         raise InvalidInputError(f"{name} is empty; start from what 'creeping sweep --example' prints")
     mistakes: list[str] = []
-    known = ("study", *SETS, "flow", "run")
+    known = ("study", "incidences", "observation", "flow", "run")
     for key, value in tables.items():
         if key not in known:
             what = "unknown table" if isinstance(value, dict) else "a key outside of the tables"
@@ -186,13 +183,13 @@ def parse_study(text: str, *, folder: Path, name: str = "the study") -> Study:
         table = {key: value for key, value in table.items() if key != "observation"}
         mistakes.append(f"[study] observation is a table of its own: {as_list.format('observation')}")
         observed = None
-    main = read_table("study", table, STUDY, mistakes)
-    flow = read_table("flow", tables.get("flow", {}), FLOW, mistakes)
-    run = read_table("run", tables.get("run", {}), RUN, mistakes)
+    main = read_table("study", table, BODY | FILE | TABLES["study"], mistakes)
+    flow = read_table("flow", tables.get("flow", {}), TABLES["flow"], mistakes)
+    run = read_table("run", tables.get("run", {}), TABLES["run"], mistakes)
     if not 1e-12 <= flow["tolerance"] <= 1e-1:
         mistakes.append(f"[flow] tolerance = {flow['tolerance']:g} is not between 1e-12 and 1e-1")
     sets: dict[str, FloatArray | None] = {}
-    for key in SETS:
+    for key in known[1:3]:
         if isinstance(tables.get(key), dict):
             sets[key] = read_directions(key, tables[key], folder, mistakes)
         elif key in tables:

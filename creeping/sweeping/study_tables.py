@@ -159,9 +159,6 @@ def nearest(word: str, known: Iterable[str]) -> str:
     return f"; did you mean {close[0]}?" if close else f"; known are {', '.join(names)}"
 
 
-_COUNT = {"count": Key(count(MOST), 1, required=True)}
-
-
 def _ranges(first: str, second: str) -> dict[str, Key]:
     found: dict[str, Key] = {}
     for name in (first, second):
@@ -174,7 +171,7 @@ def _ranges(first: str, second: str) -> dict[str, Key]:
 
 
 KINDS: dict[str, dict[str, Key]] = {
-    "fibonacci": _COUNT,
+    "fibonacci": {"count": Key(count(MOST), 1, required=True)},
     "lebedev": {"order": Key(count(MOST), 3, required=True)},
     "grid": {
         "theta_count": Key(count(MOST), 1, required=True),
@@ -185,7 +182,7 @@ KINDS: dict[str, dict[str, Key]] = {
     "great-circle": {
         "first": Key("vector", required=True),
         "through": Key("vector", required=True),
-        **_COUNT,
+        "count": Key(count(MOST), 1, required=True),
         "angle_deg_min": Key("number", 0.0),
         "angle_deg_max": Key("number", 360.0),
     },
