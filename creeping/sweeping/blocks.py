@@ -92,8 +92,6 @@ def sweep_blocks(
     blocks = [wavenumbers[first : first + each] for first in range(0, all_k, each)]
     started = time.perf_counter()
     done: list[xarray.Dataset] = []
-    place = Path(store) / _name(0)
-
     shown, took = started, 0.0
 
     def show(last: bool = False) -> None:
@@ -101,7 +99,7 @@ def sweep_blocks(
         begun = time.perf_counter()
         if rows is None or not (last or begun - shown >= max(EVERY, SHARE * took)):
             return
-        if (found := _so_far(done, place, blocks)) is not None:
+        if (found := _so_far(done, Path(store), blocks)) is not None:
             rows(found)
         shown = time.perf_counter()
         took = shown - begun
@@ -158,9 +156,9 @@ def _name(number: int) -> str:
     return f"{number:04d}"
 
 
-def _so_far(done: list[xarray.Dataset], place: Path, blocks: list[FloatArray]) -> Rows | None:
-    """What the blocks hold that are done, and the one at a place; nothing if there is none yet."""
-    parts = list(done)
+def _so_far(done: list[xarray.Dataset], store: Path, blocks: list[FloatArray]) -> Rows | None:
+    """What the blocks of a folder hold that are done, and the next one; nothing if there is none yet."""
+    parts, place = list(done), store / _name(len(done))
     if len(parts) < len(blocks) and place.exists():
         parts.append(SweepStore.open(place).dataset(loaded=True))
     if not parts:
