@@ -28,7 +28,7 @@ from creeping.geometry.directions import azimuth_elevation_of, directions_from_a
 from creeping.geometry.parts import why_no_rays
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface, size
-from creeping.phaseflow.tuning.flow_choice import choose_flow
+from creeping.phaseflow.tuning.request import choose_flow
 from creeping.rays.fan import launch
 from creeping.rays.reach import body_length
 from creeping.rays.transport import Flow
