@@ -59,8 +59,8 @@ from .geometry.incident import PointSource as PointSource
 from .phaseflow.cache import load_phase_map as load_phase_map
 from .phaseflow.phase_map import ErrorGrowth as ErrorGrowth
 from .phaseflow.phase_map import PhaseMap as PhaseMap
-from .phaseflow.tuning.flow_choice import choose_flow as choose_flow
 from .phaseflow.tuning.request import build_phase_map as build_phase_map
+from .phaseflow.tuning.request import choose_flow as choose_flow
 from .rays.fan import RayFan as RayFan
 from .rays.fan import launch as launch
 from .rays.isophase import IsoPhaseCurve as IsoPhaseCurve

@@ -53,7 +53,7 @@ def sweep(
     Exit code 4 if --resume would go on: some incidences are missing or failed. 3 if all of them failed.
     """
     from creeping.errors import InvalidInputError
-    from creeping.sweeping.studyfile.study import EXAMPLE, read_study
+    from creeping.sweeping.study import EXAMPLE, read_study
 
     if example:
         print(EXAMPLE, end="")

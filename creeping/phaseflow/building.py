@@ -22,8 +22,7 @@ from creeping.geodesics.states import pack
 from creeping.geodesics.tableaus import RUNGE_KUTTA_4
 from creeping.geometry.checks import check_surface
 from creeping.geometry.surface import Surface, fingerprint
-from creeping.phaseflow.coordinates.ambient import AmbientModel
-from creeping.phaseflow.coordinates.base import Model, nodes_of
+from creeping.phaseflow.coordinates.base import AmbientModel, Model, nodes_of
 from creeping.phaseflow.coordinates.rotation import CompiledModel, packed_lanes, with_flags
 from creeping.phaseflow.phase_map import ErrorGrowth, PhaseMap
 from creeping.phaseflow.splines import PACKED, Grid, Leap, prefilter

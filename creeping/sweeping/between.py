@@ -43,8 +43,6 @@ NODES = np.arange(-2, 4)
 """Of a stencil, from its cell's own on."""
 BASE = 2
 """Place of the cell's own node, x = 0, among them."""
-MOST_NODES = 20_000
-"""Nodes that are kept from one call to the next."""
 SAFE, NOISE = 2.0, 1e-5
 """Stated error over the differences, and what the flow and the searches for rays leave, over the sheets' sizes; both
 set on six bodies."""
@@ -84,6 +82,49 @@ def totals(values: FloatArray) -> FloatArray:
     for row in values[1:]:
         out = out + row
     return out
+
+
+def sheet_sums(
+    amplitudes: ComplexArray,
+    paths: FloatArray,
+    label: IntArray,
+    six: FloatArray,
+    errors: FloatArray,
+    wavenumbers: FloatArray,
+    kinds: int,
+) -> tuple[ComplexArray, FloatArray, FloatArray, FloatArray]:
+    """Sums over the sheets of each kind for n incidences, (n, kinds, columns): f, sum e, sum e^2 and sum |a|^2.
+
+    e = max over the errors' weights v of |sum_j v_j a_j| + k |a| |sum_j v_j L_j|. An incidence has the same in whatever
+    company: nodes and sheets are added one after the other.
+
+    Parameters
+    ----------
+    amplitudes : (sheets, 6, columns)
+        a_j.
+    paths : (sheets, 6)
+        L_j.
+    label : (sheets,) of int
+        Kind of each sheet.
+    six, errors : (n, 6), (several, n, 6)
+    wavenumbers : (columns,)
+    """
+    shape = len(six), kinds, len(wavenumbers)
+    # (1 + several, n, sheets, columns), nodes added one after the other
+    every = np.concatenate([six[None], errors])[..., None, None]
+    wave: ComplexArray = every[:, :, 0] * amplitudes[:, 0]
+    length: FloatArray = every[:, :, 0] * paths[:, :1]
+    for j in range(1, len(NODES)):
+        wave += every[:, :, j] * amplitudes[:, j]
+        length += every[:, :, j] * paths[:, j, None]
+    size = np.abs(wave)
+    off = np.max(size[1:] + size[0] * np.abs(length[1:]) * wavenumbers, axis=0, initial=0.0)
+    wave = wave[0] * np.exp(1j * wavenumbers * length[0])
+    fields, parts = np.zeros(shape, dtype=complex), np.zeros((3, *shape))
+    for sheet, kind in enumerate(label):
+        fields[:, kind] += wave[:, sheet]
+        parts[:, :, kind] += [off[:, sheet], off[:, sheet] ** 2, size[0, :, sheet] ** 2]
+    return fields, parts[0], parts[1], parts[2]
 
 
 def links(
@@ -306,8 +347,6 @@ class FieldsBetween:
         """Arrays of results of unit directions (n, 3)."""
         incidences = np.asarray(incidences, dtype=float)
         out, left = self.request.empty(len(incidences)), np.arange(len(incidences))
-        if len(self._nodes) > MOST_NODES:
-            self._nodes = Nodes(self._plain, self._lattice)
         for level in range(self._lattice.levels):
             if len(left):
                 left = left[~self._level(level, incidences[left], left, out)]
@@ -380,22 +419,17 @@ class FieldsBetween:
         self, nodes: Nodes, chain: IntArray, six: FloatArray, errors: FloatArray
     ) -> tuple[Any, FloatArray, BoolArray]:
         """Fields (n, m, 2, columns) of reflected and of creeping sheets, their differences, and who passes (n,)."""
-        from creeping.sweeping.kernels.sheet_sums import ERROR, IMAGINARY, REAL, SIZE, SQUARE, SUMS, sheet_sums
-
-        k, amplitudes = self._wavenumbers, np.zeros((0, 1)) if nodes.amplitudes is None else nodes.amplitudes
-        sheets, label = amplitudes[chain], nodes.label[chain[:, 0]]
-        parts = np.stack([sheets.real, sheets.imag], axis=2)
-        out = np.zeros((len(six), 2 * self._many, SUMS, len(k)))
-        sheet_sums(parts, nodes.path[chain], label, six, np.ascontiguousarray(errors), k, out)
-        out = out.reshape(len(six), self._many, 2, SUMS, len(k))
-        fields = out[..., REAL, :] + 1j * out[..., IMAGINARY, :]
-        differences, squares, sizes = (out[..., which, :] for which in (ERROR, SQUARE, SIZE))
+        none: ComplexArray = np.zeros((0, 1), dtype=complex)
+        amplitudes = none if nodes.amplitudes is None else nodes.amplitudes
+        label, kinds = nodes.label[chain[:, 0]], 2 * self._many
+        sums = sheet_sums(amplitudes[chain], nodes.path[chain], label, six, errors, self._wavenumbers, kinds)
+        fields, differences, squares, sizes = (one.reshape(len(six), self._many, 2, -1) for one in sums)
         differences = SAFE * differences + NOISE * np.sqrt(sizes)
         # of a conductor's components together
         squares, sizes = (np.add.reduceat(each, self._first, axis=-1) for each in (squares, sizes))
         whole = squares[:, :, 0] + squares[:, :, 1] <= self._accuracy**2 * (sizes[:, :, 0] + sizes[:, :, 1])
         creeping = squares[:, :, 1] <= (OF_CREEPING * self._accuracy) ** 2 * sizes[:, :, 1]
-        return fields, differences, np.all(whole & creeping, axis=(1, 2))
+        return fields, np.asarray(differences), np.all(whole & creeping, axis=(1, 2))
 
     def _problems(self, results: Arrays, inside: IntArray, fields: Any, differences: FloatArray) -> Iterator[Problem]:
         """What was summed, by boundary and wavenumber, with the errors and flags of the corners."""

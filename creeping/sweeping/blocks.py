@@ -47,19 +47,10 @@ class Rows(NamedTuple):
 Told = Callable[[Rows], None]
 
 
-def stored_flow(store: str | Path, body: Surface) -> Flow | None:
-    """Flow that a folder of blocks was begun with; None where none of them has begun."""
+def begun(store: str | Path) -> SweepStore | None:
+    """The first block of a folder, if it has begun: its flow is that of all, and so are the sizes, see `sizes_of`."""
     first = Path(store) / _name(0)
-    return SweepStore.open(first).flow(body) if first.exists() else None
-
-
-def stored_sizes(store: str | Path) -> tuple[int, int] | None:
-    """See `sizes_of`: those that a folder of blocks was begun with."""
-    first = Path(store) / _name(0)
-    if not first.exists():
-        return None
-    found = SweepStore.open(first)
-    return len(found.key["request"]["wavenumbers"]), found.chunk
+    return SweepStore.open(first) if first.exists() else None
 
 
 def sweep_blocks(
@@ -101,8 +92,6 @@ def sweep_blocks(
     blocks = [wavenumbers[first : first + each] for first in range(0, all_k, each)]
     started = time.perf_counter()
     done: list[xarray.Dataset] = []
-    place = Path(store) / _name(0)
-
     shown, took = started, 0.0
 
     def show(last: bool = False) -> None:
@@ -110,7 +99,7 @@ def sweep_blocks(
         begun = time.perf_counter()
         if rows is None or not (last or begun - shown >= max(EVERY, SHARE * took)):
             return
-        if (found := _so_far(done, place, blocks)) is not None:
+        if (found := _so_far(done, Path(store), blocks)) is not None:
             rows(found)
         shown = time.perf_counter()
         took = shown - begun
@@ -137,7 +126,7 @@ def sweep_blocks(
         with suppress(CreepingError):
             show(last=True)
         raise
-    return _joined(done)
+    return _joined(done, len(blocks))
 
 
 def sizes_of(
@@ -167,42 +156,30 @@ def _name(number: int) -> str:
     return f"{number:04d}"
 
 
-def _so_far(done: list[xarray.Dataset], place: Path, blocks: list[FloatArray]) -> Rows | None:
-    """What the blocks hold that are done, and the one at a place; nothing if there is none yet."""
-    parts = list(done)
+def _so_far(done: list[xarray.Dataset], store: Path, blocks: list[FloatArray]) -> Rows | None:
+    """What the blocks of a folder hold that are done, and the next one; nothing if there is none yet."""
+    parts, place = list(done), store / _name(len(done))
     if len(parts) < len(blocks) and place.exists():
         parts.append(SweepStore.open(place).dataset(loaded=True))
     if not parts:
         return None
-    parts += [_empty(parts[0], block) for block in blocks[len(parts) :]]
-    known = np.concatenate(
-        [np.repeat(one["incidence_status"].values[:, None] != MISSING, one.sizes["wavenumber"], 1) for one in parts],
-        axis=1,
-    )
-    return Rows(_joined(parts), known)
+    known = np.zeros((parts[0].sizes["incidence"], sum(map(len, blocks))), dtype=bool)
+    for number, one in enumerate(parts):
+        first = sum(map(len, blocks[:number]))
+        known[:, first : first + len(blocks[number])] = one["incidence_status"].values[:, None] != MISSING
+    joined = _joined(parts, len(blocks))
+    blank = {name: {"b": False, "i": MISSING}.get(one.dtype.kind, np.nan) for name, one in joined.data_vars.items()}
+    return Rows(joined.reindex(wavenumber=np.concatenate(blocks), fill_value=blank), known)
 
 
-def _empty(like: xarray.Dataset, wavenumbers: FloatArray) -> xarray.Dataset:
-    """A dataset of other wavenumbers, with nothing in it."""
-    found = like.isel(wavenumber=np.zeros(len(wavenumbers), dtype=int)).assign_coords(
-        wavenumber=("wavenumber", wavenumbers, like["wavenumber"].attrs)
-    )
-    blank = {"b": False, "i": MISSING, "u": 0}
-    filled = {
-        name: values.copy(data=np.full(values.shape, blank.get(values.dtype.kind, np.nan), values.dtype))
-        for name, values in found.data_vars.items()
-    }
-    return found.assign(filled)
-
-
-def _joined(parts: list[xarray.Dataset]) -> xarray.Dataset:
-    """One dataset of blocks of wavenumbers; an incidence has failed, or is missing, if it has at any of them."""
-    if len(parts) == 1:
+def _joined(parts: list[xarray.Dataset], count: int) -> xarray.Dataset:
+    """One dataset of so many blocks of wavenumbers, or the first; an incidence has failed, or is missing, if at any."""
+    if count == 1:
         return parts[0]
     options: dict[str, Any] = {"data_vars": "minimal", "coords": "minimal", "compat": "override", "join": "override"}
     found = require("xarray").concat(parts, dim="wavenumber", combine_attrs="override", **options)
     each = np.stack([one["incidence_status"].values for one in parts])
-    status = np.where(np.any(each == MISSING, axis=0), MISSING, each.max(axis=0))
+    status = np.where(np.any(each == MISSING, axis=0) | (len(parts) < count), MISSING, each.max(axis=0))
     status = np.where(np.any(each == FAILED, axis=0), FAILED, status)
     words = count_attributes(status, [])
     texts = dict.fromkeys(text for one in parts for text in str(one.attrs.get("errors", "")).splitlines())

@@ -25,7 +25,7 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.errors import CreepingError
 from creeping.geometry.surface import Surface
-from creeping.sweeping.layout import UNDONE
+from creeping.sweeping.layout import TaskStatus
 from creeping.sweeping.plan import Arrays, FirstTaskGuard, Maker, SweepPlan, common_error, compute
 from creeping.sweeping.request import SweepRequest
 from creeping.sweeping.store import SweepStore
@@ -83,7 +83,7 @@ def fill_on(
             store.commit(task, failures=failed > 0)
             yield task
             # those that failed before may fail again
-            if status[task] == UNDONE:
+            if status[task] == TaskStatus.UNDONE:
                 guard.add(store.rows(task).stop - store.rows(task).start, common)
         for task in dead:
             found = _singly(client, plan, plan.rows(task), stop)

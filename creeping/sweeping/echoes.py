@@ -7,8 +7,6 @@ from the plane z = 0. The wave of a radar at (azimuth, elevation) travels the ot
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,12 +28,12 @@ from creeping.geometry.directions import azimuth_elevation_of, directions_from_a
 from creeping.geometry.parts import why_no_rays
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface, size
-from creeping.phaseflow.tuning.flow_choice import choose_flow
+from creeping.phaseflow.tuning.request import choose_flow
 from creeping.rays.fan import launch
 from creeping.rays.reach import body_length
 from creeping.rays.transport import Flow
 from creeping.shadow.line import shadow_line
-from creeping.sweeping.blocks import TASK, Told, sizes_of, stored_flow, stored_sizes, sweep_blocks
+from creeping.sweeping.blocks import TASK, Told, begun, sizes_of, sweep_blocks
 from creeping.sweeping.request import AMPLITUDES, METHODS
 from creeping.sweeping.results import SweepFields
 from creeping.sweeping.run import Progress, sweep_directions
@@ -111,8 +109,8 @@ def backscatter(
     azimuths, elevations = _angles(azimuth, elevation)
     radar = directions_from_azimuth_elevation(np.radians(azimuths), np.radians(elevations))
     asked = {"boundary": boundary, "method": method, "n_rays": n_rays, "quantity": "monostatic"}
-    named = partial(_with_angles, dimension="incidence", azimuths=azimuths, elevations=elevations)
-    return named(_swept(body, -radar, wavenumbers, asked, cache, progress, (store, resume, _told(rows, named))))
+    angles = {"azimuth": ("incidence", azimuths), "elevation": ("incidence", elevations)}
+    return _swept(body, -radar, wavenumbers, asked, angles, cache, progress, (store, resume, rows))
 
 
 def bistatic(
@@ -167,8 +165,8 @@ def bistatic(
         raise InvalidInputError(f"incidence = {shown(incidence)} is not (azimuth, elevation) in degrees") from error
     radar = directions_from_azimuth_elevation(*(float(np.radians(v[0])) for v in _angles(first, second)))
     asked = {"boundary": boundary, "method": method, "n_rays": n_rays, "quantity": "bistatic", "observation": observers}
-    named = partial(_with_angles, dimension="observer", azimuths=azimuths, elevations=elevations)
-    return named(_swept(body, -radar[None], wavenumbers, asked, cache, progress, (store, resume, _told(rows, named))))
+    angles = {"azimuth": ("observer", azimuths), "elevation": ("observer", elevations)}
+    return _swept(body, -radar[None], wavenumbers, asked, angles, cache, progress, (store, resume, rows))
 
 
 def seconds_of_currents(
@@ -231,11 +229,12 @@ def _swept(
     incidences: FloatArray,
     wavenumbers: ArrayLike,
     asked: dict[str, Any],
+    angles: dict[str, tuple[str, FloatArray]],
     cache: bool,
     progress: Progress | bool | None,
     storing: tuple[str | Path | None, bool, Told | None],
 ) -> xarray.Dataset:
-    """Sweep of checked arguments."""
+    """Sweep of checked arguments, with coordinates of ``angles``, dimension and degrees."""
     if not why_no_rays(body):
         checked_body(body, charts=not is_piecewise(body))
     checked_plain(body)
@@ -262,7 +261,8 @@ def _swept(
     elif resume:
         raise InvalidInputError("resume goes with store=, the folder of the results")
     options: dict[str, Any] = dict(asked)
-    flow: Flow | Surface | None = stored_flow(store, body) if store else None
+    known = begun(store) if store else None
+    flow: Flow | Surface | None = known.flow(body) if known else None
     if flow is None and (why_no_rays(body) or asked["method"] == "t-matrix"):
         flow = body
     elif flow is None and by_equation_alone(body, k, [asked["boundary"]], len(incidences), method=asked["method"]):
@@ -272,24 +272,20 @@ def _swept(
         flow = flow or choose_flow(body, n_rays=2 * asked["n_rays"] * len(incidences), length=length, cache=cache)
         # small enough that progress is told in time, large enough that a task is not all overhead
         options |= {"chunk": TASK, "length": length}
+
+    def named(found: xarray.Dataset) -> xarray.Dataset:
+        words = {"units": "degree", "long_name": "as seen from the body"}
+        return found.assign_coords({name: (*one, words) for name, one in angles.items()})
+
     with reporting(progress, "incidences") as told:
         if store is None:
-            return sweep_directions(flow, incidences, wavenumbers=k, progress=told, **options)
+            return named(sweep_directions(flow, incidences, wavenumbers=k, progress=told, **options))
         options.pop("chunk", None)
-        sizes = stored_sizes(store) or sizes_of(flow, incidences, k, options)
-        options |= {"store": store, "resume": resume, "sizes": sizes, "rows": rows}
-        return sweep_blocks(flow, incidences, k, progress=told, **options)
-
-
-def _told(rows: Told | None, named: Callable[[xarray.Dataset], xarray.Dataset]) -> Told | None:
-    """What is told of rows, with their angles."""
-    return rows and (lambda found: rows(found._replace(dataset=named(found.dataset))))
-
-
-def _with_angles(found: xarray.Dataset, dimension: str, azimuths: FloatArray, elevations: FloatArray) -> xarray.Dataset:
-    words = {"units": "degree", "long_name": "as seen from the body"}
-    angles = {"azimuth": azimuths, "elevation": elevations}
-    return found.assign_coords({name: (dimension, values, words) for name, values in angles.items()})
+        begun_with = known and (len(known.key["request"]["wavenumbers"]), known.chunk)
+        sizes = begun_with or sizes_of(flow, incidences, k, options)
+        seen = rows and (lambda found: rows(found._replace(dataset=named(found.dataset))))
+        options |= {"store": store, "resume": resume, "sizes": sizes, "rows": seen}
+        return named(sweep_blocks(flow, incidences, k, progress=told, **options))
 
 
 def echo_of(
@@ -310,21 +306,12 @@ def echo_of(
     first = dataset.isel(incidence=0) if bistatic_cut else dataset
     fields = SweepFields(first)
 
-    def array(values: Any) -> np.ndarray[Any, Any]:
-        return np.asarray(values.transpose(*order).values)
-
     picked = [fields.polarisation(name) if conductor else SweepFields(first.sel(boundary=name)) for name in channels]
-    amplitudes = [name for name in AMPLITUDES if name in picked[0].dataset]
-    flags = {name: np.stack([array(one.dataset[name]) for one in picked]) for name in ("unresolved", "error")}
-    found = {name: np.stack([array(one.dataset[name]) for one in picked]) for name in amplitudes}
-    served = np.stack(
-        [
-            array(one.dataset["by_currents"])
-            if "by_currents" in one.dataset
-            else np.zeros(flags["error"].shape[1:], bool)
-            for one in picked
-        ]
-    )
+
+    def stacked(name: str) -> np.ndarray[Any, Any]:
+        return np.stack([np.asarray(one.dataset[name].transpose(*order).values) for one in picked])
+
+    known, unresolved = picked[0].dataset, stacked("unresolved")
     radar = None
     if bistatic_cut:
         azimuth, elevation = azimuth_elevation_of(-dataset["direction"].values[0])
@@ -337,11 +324,11 @@ def echo_of(
         elevation=dataset["elevation"].values,
         incidence=radar,
         wavenumbers=dataset["wavenumber"].values,
-        total=found.pop("total"),
-        parts=found,
-        error=flags["error"],
-        unresolved=flags["unresolved"],
-        by_currents=served,
+        total=stacked("total"),
+        parts={name: stacked(name) for name in AMPLITUDES if name in known and name != "total"},
+        error=stacked("error"),
+        unresolved=unresolved,
+        by_currents=stacked("by_currents") if "by_currents" in known else np.zeros_like(unresolved),
         otherwise=dataset.attrs.get("served_by", "rays"),
         sound_speed=sound_speed,
     )

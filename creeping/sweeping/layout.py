@@ -9,6 +9,7 @@ import shutil
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
+from enum import IntEnum
 from pathlib import Path
 
 import numpy as np
@@ -32,12 +33,18 @@ from creeping.sweeping.results import (
 SCHEMA = 3
 ROOT, STUDY = "zarr.json", "study"
 STATUS, ERRORS = "task_status", "incidence_error"
-UNDONE, DONE, WITH_FAILURES = 0, 1, 2
 ERROR_BYTES = 256
 """Bytes kept of the message of a failed incidence, UTF-8, zeros after it."""
-COORDINATE_CHUNK = 65_536
 MOST_DOCUMENT = 10**9
 """Bytes of what describes a study, an array or a chunk of coordinates."""
+
+
+class TaskStatus(IntEnum):
+    """How far a task is."""
+
+    UNDONE = 0
+    DONE = 1
+    WITH_FAILURES = 2
 
 
 @contextmanager
@@ -71,14 +78,14 @@ def write_empty(folder: Path, plan: SweepPlan, unit: str | None = None) -> dict[
     for name, (dims, values, words) in beside.items():
         text = values.dtype.kind == "U"
         kind = str if text else values.dtype
-        where = _create(group, name, values.shape, kind, dims, words, first=COORDINATE_CHUNK, fill=None)
+        where = _create(group, name, values.shape, kind, dims, words, first=values.shape[0], fill=None)
         where[:] = values.astype(object) if text else values
     for name, variable in request.variables.items():
         shape = (count, *(request.sizes[d] for d in variable.dims))
         words, dims = variable_attributes(request, name, unit), ("incidence", *variable.dims)
         _create(group, name, shape, variable.dtype, dims, words, first=plan.chunk, fill=variable.fill)
     words = {"description": "0 missing, 1 done, 2 done but for failed incidences; written last"}
-    _create(group, STATUS, (plan.tasks,), "int8", ("task",), words, first=1, fill=UNDONE)
+    _create(group, STATUS, (plan.tasks,), "int8", ("task",), words, first=1, fill=int(TaskStatus.UNDONE))
     words = {"description": "why an incidence failed, UTF-8, zeros after it"}
     _create(group, ERRORS, (count, ERROR_BYTES), "uint8", ("incidence", "character"), words, first=plan.chunk, fill=0)
     attributes = sweep_attributes(plan, unit)

@@ -30,8 +30,8 @@ from creeping.sweeping.between import FieldsBetween
 from creeping.sweeping.request import SweepRequest
 from creeping.sweeping.sweeper import NoFlow, Passed, Sweeper
 
-MOST_IN_TASK, MOST_AT_ONCE, MOST_BETWEEN = 1024, 256, 4096
-"""Incidences of a task, of one that nobody else waits for, and of one whose results are interpolated."""
+MOST_IN_TASK, MOST_AT_ONCE = 1024, 256
+"""Incidences of a task, and of one that nobody else waits for."""
 TASK_BYTES = 64_000_000
 """Results of one task, in memory."""
 INCIDENCE_BYTES = 1_000_000_000
@@ -144,13 +144,8 @@ def task_size(request: SweepRequest, count: int, asked: int | None = None, *, sh
     if asked:
         return min(int(asked), count)
     most = -(-count // 32) if shared else min(count, MOST_AT_ONCE)
-    largest = MOST_IN_TASK
-    if request.lattice is not None:
-        # nodes at the ends of a task belong to two
-        most, largest = max(most, min(count, MOST_BETWEEN)), MOST_BETWEEN
     # memory that the next task takes again costs less than new memory
-    limit = TASK_BYTES if request.lattice is None else TASK_BYTES // 2
-    return int(np.clip(min(most, limit // bytes_of(request)), 1, largest))
+    return int(np.clip(min(most, TASK_BYTES // bytes_of(request)), 1, MOST_IN_TASK))
 
 
 def bytes_of(request: SweepRequest) -> int:

@@ -4,6 +4,7 @@ Every quantity gives the shadow line of each incidence; "rays" adds its fan, "mo
 the wave came from, "bistatic" that in given directions. Results are arrays whose first axis is the incidence.
 """
 
+import sys
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
@@ -26,7 +27,6 @@ from creeping.sweeping.lattice import Lattice, lattice_of
 Quantity = Literal["rays", "monostatic", "bistatic"]
 QUANTITIES: tuple[Quantity, ...] = ("rays", "monostatic", "bistatic")
 METHODS = ("rays", "auto", "currents", "equation", "t-matrix")
-LARGEST_LENGTH = 1e300
 LONG_LEAP = 0.15
 """Share of an automatic length up to which it is made one of whole leaps."""
 MOST_RAYS, MOST_STEPS, MOST_WAVENUMBERS = 65_536, 4096, 100_000
@@ -143,7 +143,7 @@ class SweepRequest:
             return
         number = isinstance(self.length, (int, float)) and not isinstance(self.length, bool)
         # of a whole number that is no float numpy knows nothing
-        if not (number and 0 < self.length <= LARGEST_LENGTH):
+        if not (number and 0 < self.length <= sys.float_info.max):
             yield f"length = {self.length!r} is not a positive finite number"
         for name, most in (("n_rays", MOST_RAYS), ("n_steps", MOST_STEPS)):
             value = getattr(self, name)
@@ -342,7 +342,7 @@ def sweep_length(body: Surface, length: float | Literal["auto"], wavenumbers: Ar
     if why_no_rays(body):
         return 1.0
     if not (isinstance(length, str) and length == AUTO):
-        number = isinstance(length, (int, float)) and not isinstance(length, bool) and 0 < length <= LARGEST_LENGTH
+        number = isinstance(length, (int, float)) and not isinstance(length, bool) and 0 < length <= sys.float_info.max
         return asked_length(body, float(length)) if number else length
     found = body_length(body, None if speed_of(body) is not None or not known.size else float(known.min()))
     return leap * float(np.ceil(found / leap - 1e-9)) if 0 < leap < LONG_LEAP * found else found

@@ -14,6 +14,7 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping._version import __version__
+from creeping.errors import InvalidInputError
 from creeping.field.results.labelled import COMPONENTS, POLARISATIONS, power
 from creeping.geometry.checks import UNKNOWN, unit_of
 from creeping.geometry.directions import angles_of
@@ -25,12 +26,6 @@ from creeping.sweeping.request import SweepRequest
 
 if TYPE_CHECKING:
     import xarray
-from typing import TYPE_CHECKING
-
-from creeping.errors import InvalidInputError
-
-SERVED = "rays+optics"
-"""What serves a body of pieces in place of isolated rays alone, as `creeping.FarField.method` says it."""
 MISSING = -1
 """Status of an incidence that is not computed yet."""
 STATUS_NAMES = {code: text.partition(":")[0] for code, text in INCIDENCE_STATUSES.items()} | {MISSING: "missing"}
@@ -131,7 +126,8 @@ def sweep_attributes(plan: SweepPlan, unit: str) -> dict[str, Any]:
         if request.method == "t-matrix":
             words["served_by"] = request.method
         elif is_piecewise(plan.body):
-            words["served_by"] = SERVED
+            # as `creeping.FarField.method` says it of what rays alone do not serve
+            words["served_by"] = "rays+optics"
     for name, value in flow.items():
         if name != "error" and value is not None:
             words[f"flow_{name}" if name != "kind" else "flow"] = value
@@ -145,15 +141,11 @@ def sweep_attributes(plan: SweepPlan, unit: str) -> dict[str, Any]:
 
 def count_attributes(status: IntArray, errors: list[tuple[int, str]]) -> dict[str, Any]:
     """Attributes that tell how far it is: incidences by status, errors of the first that failed."""
-    words: dict[str, Any] = {f"incidences_{k.replace(' ', '_')}": v for k, v in count_statuses(status).items()}
+    counts = {name.replace(" ", "_"): int(np.sum(status == code)) for code, name in STATUS_NAMES.items()}
+    words: dict[str, Any] = {f"incidences_{name}": count for name, count in counts.items()}
     if errors:
         words["errors"] = "\n".join(f"incidence {row}: {text}" for row, text in errors[:SHOWN])
     return words
-
-
-def count_statuses(status: IntArray) -> dict[str, int]:
-    """Number of incidences of each status, by its name."""
-    return {name: int(np.sum(status == code)) for code, name in STATUS_NAMES.items()}
 
 
 def as_dataset(plan: SweepPlan, arrays: Arrays, errors: list[tuple[int, str]]) -> "xarray.Dataset":

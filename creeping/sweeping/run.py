@@ -23,7 +23,7 @@ from creeping.phaseflow.phase_map import PhaseMap
 from creeping.rays.reach import AUTO
 from creeping.rays.transport import Flow, checked_flow
 from creeping.storage.memory import within_budget
-from creeping.sweeping.layout import UNDONE
+from creeping.sweeping.layout import TaskStatus
 from creeping.sweeping.plan import Arrays, FirstTaskGuard, SweepPlan, bytes_of, common_error, compute, task_size
 from creeping.sweeping.request import Quantity, solved_alone, sweep_length, sweep_request, with_lattice
 from creeping.sweeping.results import as_dataset, require
@@ -246,7 +246,7 @@ def _computed(
     """Results of tasks, one after the other in this process, and the errors of incidences that failed, by row."""
     sweeper = plan.make(plan.flow, plan.request)
     sweeper.store = store.matrices if store else None
-    before, guard = store.status() if store else [UNDONE] * plan.tasks, FirstTaskGuard()
+    before, guard = store.status() if store else [TaskStatus.UNDONE] * plan.tasks, FirstTaskGuard()
     for task in tasks:
         if stop():
             return
@@ -255,7 +255,7 @@ def _computed(
         arrays, errors = compute(sweeper, plan.incidences[rows])
         yield task, arrays, errors
         # those that failed before may fail again
-        if before[task] == UNDONE:
+        if before[task] == TaskStatus.UNDONE:
             guard.add(rows.stop - rows.start, common_error(errors, rows.stop - rows.start))
 
 

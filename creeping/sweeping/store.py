@@ -29,7 +29,6 @@ from creeping.shadow.status import FAILED
 from creeping.storage.folder import content_digest
 from creeping.storage.reading import bytes_of
 from creeping.sweeping.layout import (
-    DONE,
     ERROR_BYTES,
     ERRORS,
     MOST_DOCUMENT,
@@ -37,8 +36,7 @@ from creeping.sweeping.layout import (
     SCHEMA,
     STATUS,
     STUDY,
-    UNDONE,
-    WITH_FAILURES,
+    TaskStatus,
     aside_of,
     unchanging_digest,
     write_empty,
@@ -192,7 +190,7 @@ class SweepStore:
     def incidence_status(self) -> IntArray:
         """Status of the incidences (n,); -1 of those that are missing."""
         found = self._whole("incidence_status", self.rows)
-        for task in np.flatnonzero(self.status() == UNDONE):
+        for task in np.flatnonzero(self.status() == TaskStatus.UNDONE):
             found[self.rows(int(task))] = MISSING
         return found
 
@@ -209,7 +207,7 @@ class SweepStore:
 
     def missing(self) -> list[int]:
         """Tasks that are not done; those with failed incidences are among them, to be tried again."""
-        return [int(task) for task in np.flatnonzero(self.status() != DONE)]
+        return [int(task) for task in np.flatnonzero(self.status() != TaskStatus.DONE)]
 
     def write_task(self, task: int, arrays: Arrays, errors: dict[int, str]) -> None:
         """Write all chunks of a task; `commit` marks it afterwards.
@@ -220,9 +218,9 @@ class SweepStore:
             If an array has not the shape that the layout says.
         """
         rows = self.rows(task)
-        if self.array(STATUS)[task] != UNDONE:
+        if self.array(STATUS)[task] != TaskStatus.UNDONE:
             # a task that is tried again is not whole until it is marked again
-            self.put(STATUS, slice(task, task + 1), UNDONE)
+            self.put(STATUS, slice(task, task + 1), TaskStatus.UNDONE)
         for name in self.variables:
             expected = (rows.stop - rows.start, *self.array(name).shape[1:])
             if arrays[name].shape != expected:
@@ -237,18 +235,18 @@ class SweepStore:
 
     def commit(self, task: int, *, failures: bool) -> None:
         """Mark a task, all of whose chunks are written."""
-        self.put(STATUS, slice(task, task + 1), WITH_FAILURES if failures else DONE)
+        self.put(STATUS, slice(task, task + 1), TaskStatus.WITH_FAILURES if failures else TaskStatus.DONE)
 
     def undo(self, task: int) -> None:
         """Mark a task as missing."""
         for name in self.variables:
             self.chunk_file(name, task).unlink(missing_ok=True)
-        self.put(STATUS, slice(task, task + 1), UNDONE)
+        self.put(STATUS, slice(task, task + 1), TaskStatus.UNDONE)
 
     def failures(self, most: int = SHOWN) -> list[tuple[int, str]]:
         """The first incidences that failed, and why."""
         found: list[tuple[int, str]] = []
-        for task in np.flatnonzero(self.status() == WITH_FAILURES):
+        for task in np.flatnonzero(self.status() == TaskStatus.WITH_FAILURES):
             first = self.rows(int(task)).start
             failed, texts = self.read("incidence_status", int(task)) == FAILED, self.read(ERRORS, int(task))
             for row in np.flatnonzero(failed)[: most - len(found)]:
@@ -277,7 +275,7 @@ class SweepStore:
         """
         damaged = []
         with self.locked() if repair else nullcontext():
-            for task in map(int, np.flatnonzero(self.status() != UNDONE)):
+            for task in map(int, np.flatnonzero(self.status() != TaskStatus.UNDONE)):
                 try:
                     for name in self.variables:
                         self.read(name, task)
@@ -291,7 +289,11 @@ class SweepStore:
         """Done tasks without all their chunks, and the first variable that they lack."""
         lost = {}
         for task, mark in enumerate(self.status()):
-            names = [] if mark == UNDONE else [*self.variables, *([ERRORS] if mark == WITH_FAILURES else [])]
+            names = (
+                []
+                if mark == TaskStatus.UNDONE
+                else [*self.variables, *([ERRORS] if mark == TaskStatus.WITH_FAILURES else [])]
+            )
             name = next((name for name in names if not self._exists(name, task)), None)
             if name is not None:
                 lost[task] = name
@@ -374,7 +376,7 @@ class SweepStore:
             If its chunk is damaged, or is missing though the task is done.
         """
         with self.reading(name, task):
-            if not self._exists(name, task) and self.array(STATUS)[task] != UNDONE:
+            if not self._exists(name, task) and self.array(STATUS)[task] != TaskStatus.UNDONE:
                 # zarr would read the fill value
                 raise ValueError("its chunk is missing")
             return self.array(name)[self.rows(task)]

@@ -276,7 +276,7 @@ class Sweeper:
             (k, wavenumber), (name, _, _) = case
             boundary = parse_boundary(name)
             if together and number == 0:
-                solve_together(self.body, directions, wavenumber, boundary)
+                solve_together(self.body, directions, wavenumber, boundary, fine=request.method == "equation")
             field = _field(fans(number), observers[number], wavenumber, boundary, request)
             some = rows[number : number + 1]
             self._put(out, some, case, FieldArrays.of(field, 1).arrays)

@@ -22,7 +22,7 @@ from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
 from creeping.geometry.surface import normal
-from creeping.phaseflow.tuning.flow_choice import tuned_direct
+from creeping.phaseflow.tuning.request import tuned_direct
 from studies.tables import Row
 
 BODIES = ("ellipsoid", "torus", "twisted", "gridded")

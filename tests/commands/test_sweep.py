@@ -12,7 +12,7 @@ from filelock import FileLock
 from creeping.commands import sweep as _sweep_command
 from creeping.sweeping import cluster
 from creeping.sweeping import run as running
-from creeping.sweeping.studyfile.study import EXAMPLE
+from creeping.sweeping.study import EXAMPLE
 
 STUDY = """
 [study]

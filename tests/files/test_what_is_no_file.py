@@ -10,8 +10,8 @@ from creeping.files import read_cut, read_ffe
 from creeping.storage.folder import read_manifest
 from creeping.storage.reading import bytes_of
 from creeping.sweeping.layout import unchanging_digest
-from creeping.sweeping.studyfile.schema import _table
-from creeping.sweeping.studyfile.study import read_study
+from creeping.sweeping.study import read_study
+from creeping.sweeping.study_tables import _table
 from scatterers import Cad, Mesh
 
 

@@ -159,7 +159,7 @@ class Studies:
 
     def prepare(self, folder: Path) -> None:
         """Read the file to begin with."""
-        from creeping.sweeping.studyfile.study import EXAMPLE, parse_study
+        from creeping.sweeping.study import EXAMPLE, parse_study
 
         self.forms = [seeds.STUDY, EXAMPLE.encode()]
         self.folder = folder
@@ -169,7 +169,7 @@ class Studies:
     def attempt(self, number: int, rng: Generator, place: Path) -> Verdict:
         """Change a file and parse it."""
         from creeping import CreepingError
-        from creeping.sweeping.studyfile.study import read_study
+        from creeping.sweeping.study import read_study
 
         which = int(rng.integers(2))
         data = mutated(self.forms[which], rng, other=self.forms[1 - which], text=True)
@@ -208,7 +208,7 @@ class Directions:
     def attempt(self, number: int, rng: Generator, place: Path) -> Verdict:
         """Change the file, read it, and compare it with what another reader finds."""
         from creeping import CreepingError
-        from creeping.sweeping.studyfile.schema import read_directions
+        from creeping.sweeping.study_tables import read_directions
 
         data = mutated(self.seed, rng, text=self.suffix == "csv")
         path = place.with_suffix(f".{self.suffix}")

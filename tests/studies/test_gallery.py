@@ -15,7 +15,7 @@ import creeping
 import scatterers
 import studies
 from creeping.commands.main import app
-from creeping.sweeping.studyfile.study import parse_study
+from creeping.sweeping.study import parse_study
 from studies import __main__ as command
 from studies import tables
 from studies.gallery import building
@@ -121,7 +121,7 @@ def test_commands_and_studies_are_understood(page):
         elif words[0] == "creeping" and len(words) > 1 and not words[1].startswith("-"):
             app[words[1]]
     for text in blocks(page, "toml"):
-        assert parse_study(text, folder=Path(".")).asked["flow"] == "auto"
+        assert parse_study(text, folder=Path(".")).flow == "auto"
 
 
 def study_is_there(words):

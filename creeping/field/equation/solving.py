@@ -175,10 +175,15 @@ def asked_solution(body: Surface, direction: FloatArray, wavenumber: float, boun
     return found
 
 
-def solve_together(body: Surface, directions: FloatArray, wavenumber: float, boundary: BoundaryLike) -> None:
-    """Solve the equation for unit directions (m, 3) at once and keep it, if it costs less than SECONDS for one."""
+def solve_together(
+    body: Surface, directions: FloatArray, wavenumber: float, boundary: BoundaryLike, *, fine: bool = False
+) -> None:
+    """Solve the equation for unit directions (m, 3) at once and keep it, if it costs less than SECONDS for one.
+
+    On fine tiles alone, if these are asked for.
+    """
     plan = plan_of(body, wavenumber, boundary, incidences=len(directions))
-    if not plan.refused:
+    if not (plan.refused or (fine and plan.effort.coarse)):
         try:
             _keep(body, _solved(body, directions, wavenumber, boundary, plan.effort))
         except (InvalidInputError, SurfaceError):

@@ -16,8 +16,7 @@ from creeping.geometry.arguments import (
     whole_number,
 )
 from creeping.geometry.surface import Surface, size
-from creeping.phaseflow.coordinates.ambient import AmbientModel
-from creeping.phaseflow.coordinates.base import Model, model_of
+from creeping.phaseflow.coordinates.base import AmbientModel, Model, model_of
 from creeping.phaseflow.splines import MARGIN, least_cells
 from creeping.storage.memory import within_budget
 

@@ -1,31 +1,57 @@
-"""Asking for a phase map: parameters checked against each other, the missing ones chosen, the cache consulted."""
+"""Asking for a flow: a phase map, its missing parameters chosen, or the quicker of a map and direct integration.
 
+Direct integration takes c_d seconds a ray, with the longest equal steps that meet the tolerance; a map takes b seconds
+to build and c_m a ray. For N rays the map is chosen if b + N c_m < N c_d. All three are counted work times nominal
+seconds (`nominal_cost`), c_m once more after the build: the choice follows from what was asked for and from the maps
+in the cache, not from how busy the machine is.
+
+Sources: Derivations, R16.
+"""
+
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from creeping.errors import ToleranceError
+from creeping._typing import FloatArray
+from creeping.errors import IntegrationError, ToleranceError
+from creeping.geodesics.bundle import random_bundle_points
+from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geodesics.equations import natural_horizon
-from creeping.geometry.arguments import (
-    checked_body,
-    folder_path,
-    reporter,
-)
-from creeping.geometry.piecewise import checked_smooth
-from creeping.geometry.surface import Surface
+from creeping.geodesics.integrator import ErrorEstimate, trace_states
+from creeping.geodesics.states import pack
+from creeping.geometry.arguments import checked_body, folder_path, number_between, positive_number, reporter
+from creeping.geometry.piecewise import checked_smooth, is_piecewise
+from creeping.geometry.surface import Surface, size
 from creeping.phaseflow.building import (
     Plan,
     Progress,
     build_direct,
     build_tower,
     require_checked,
+    sampled_errors,
+    upper_bound,
     with_errors,
 )
-from creeping.phaseflow.cache import cached_phase_map
+from creeping.phaseflow.cache import cached_phase_map, is_cached
+from creeping.phaseflow.coordinates.base import model_of
+from creeping.phaseflow.coordinates.rotation import CompiledModel
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.phaseflow.splines import Grid
 from creeping.phaseflow.tuning.map_spec import RAYS, MapSpec
-from creeping.phaseflow.tuning.search import tuned_map
+from creeping.phaseflow.tuning.nominal_cost import direct_seconds, map_seconds, tracing_cost
+from creeping.phaseflow.tuning.search import Candidate, candidates, tuned_map
+
+SAMPLES = 512
+"""Rays on which direct integration is measured, fewer where F is expensive."""
+BUDGET = 0.2
+"""Nominal seconds that one measurement may take."""
+QUICK = 0.3
+"""Nominal seconds of direct integration below which nothing is tuned."""
+WORTH = 0.85
+"""Share of direct integration that a map must be expected to take less than, and its tuning too."""
+SMALLEST = 60_000
+"""Nodes of the smallest map that is worth estimating."""
 
 
 def build_phase_map(
@@ -158,3 +184,216 @@ def build_from(spec: MapSpec, progress: Progress) -> PhaseMap:
             rms=reached,
         )
     return result
+
+
+def choose_flow(
+    body: Surface,
+    *,
+    n_rays: int,
+    length: float,
+    tolerance: float = 1e-6,
+    n_steps: int = 1,
+    carry_jacobi: bool = True,
+    cache: bool | str | Path = True,
+    progress: Progress | bool | None = None,
+) -> PhaseMap | DirectFlow:
+    """Choose the flow that traces the rays fastest, including the time to prepare a map.
+
+    Parameters
+    ----------
+    body : Surface
+    n_rays : int
+        Total number of rays of all incidences.
+    length : float, L (travel time for a weighted body)
+    tolerance : float
+        Rms error of (x, p) at the end of the rays, 1e-12 to 1e-1.
+    n_steps : int
+        Number of equally spaced points wanted on each ray.
+    carry_jacobi : bool
+        Whether the flow must carry the Jacobi matrix, which fans need.
+    cache : bool or path
+        As for `build_phase_map`. A cached map counts as free.
+    progress : callable or bool, optional
+        Called with a line of text before each long step and with the reason for the choice; True shows them.
+
+    Returns
+    -------
+    PhaseMap or DirectFlow
+        Its horizon divides ``length/n_steps``. Bodies without compiled kernels always get a `DirectFlow`.
+
+    Raises
+    ------
+    InvalidInputError
+        On a number out of range.
+    ToleranceError
+        If direct integration does not reach the tolerance.
+
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> import scatterers as sc
+    >>> flow = cr.choose_flow(sc.Sphere(), n_rays=10, length=1.0, tolerance=1e-6, cache=False)
+    >>> type(flow).__name__, flow.error.rms < 1e-6             # few rays do not pay for a map
+    ('DirectFlow', True)
+    """
+    checked_body(body, charts=not is_piecewise(body))
+    tolerance = number_between(tolerance, "tolerance", 1e-12, 1e-1)
+    length = positive_number(length, "length")
+    cache = cache if isinstance(cache, bool) else folder_path(cache, "cache")
+    spec = MapSpec(
+        body=body,
+        tolerance=max(tolerance, 1e-9),
+        length=length,
+        n_steps=n_steps,
+        n_rays=n_rays,
+        carry_jacobi=carry_jacobi,
+    )
+    report = reporter(progress)
+    if is_piecewise(body):
+        report("direct integration: a body with creases has no phase map")
+        # errors of the steps add up and grow along the rays
+        return DirectFlow(body, float(np.clip(1e-4 * tolerance, 1e-13, 1e-8)), length / n_steps)
+    require_checked(body)
+    if cache is False:
+        return _chosen(spec, tolerance, False, False, report)
+    stored = _stored(spec, tolerance, cache)
+    return _chosen(stored or spec, tolerance, cache, stored is not None, report)
+
+
+def _stored(spec: MapSpec, tolerance: float, cache: bool | str | Path) -> MapSpec | None:
+    """The spec of a map in the cache that serves: the one asked for, or one for the usual number of rays."""
+    if tolerance < 1e-9:
+        return None
+    for one in (spec, replace(spec, n_rays=RAYS)):
+        if is_cached(one.body, one.key(), folder=cache):
+            return one
+    return None
+
+
+def _chosen(
+    spec: MapSpec, tolerance: float, cache: bool | str | Path, stored: bool, progress: Progress
+) -> PhaseMap | DirectFlow:
+    """The flow that is cheaper; a map that is ``stored`` costs nothing but its rays."""
+    body, n_rays, n_steps, carry_jacobi = spec.body, spec.n_rays, spec.n_steps, spec.carry_jacobi
+    length = spec.length
+    assert length is not None
+    cost = tracing_cost(body)
+    if n_rays * length * cost < QUICK and not stored:
+        progress(f"direct integration: carrying {n_rays} rays takes about {n_rays * length * cost:.1g} s, fields apart")
+        return _untuned_direct(body, length, n_steps, tolerance)
+    direct, each = tuned_direct(body, length, n_steps, tolerance, carry_jacobi)
+    if not stored:
+        found, reason = _worth_building(spec, n_rays * each, cost, tolerance)
+        if reason:
+            progress(f"direct integration: {reason}")
+            return direct
+        spec = replace(spec, seconds=WORTH * n_rays * each)
+    else:
+        found = None
+
+    def build() -> PhaseMap:
+        return tuned_map(spec, progress, found)
+
+    try:
+        flow = build() if cache is False else cached_phase_map(body, spec.key(), build, folder=cache, progress=progress)
+    except ToleranceError as error:
+        progress(f"direct integration: {error}")
+        return direct
+    composed = map_seconds(flow, length, carry_jacobi=carry_jacobi)
+    if composed > each:
+        progress(f"direct integration: about {1e6 * each:.2g} us a ray, with the map {1e6 * composed:.2g}")
+        return direct
+    progress(f"phase map: about {1e6 * composed:.2g} us a ray, direct integration {1e6 * each:.2g}")
+    return flow
+
+
+def _worth_building(spec: MapSpec, direct: float, cost: float, tolerance: float) -> tuple[list[Candidate], str]:
+    """Candidates for a map, and the reason to build none of them, if there is one; ``direct`` in nominal seconds."""
+    body = spec.body
+    time = f"carrying {spec.n_rays} rays takes about {direct:.2g} s, fields apart"
+    if tolerance < 1e-9:
+        return [], f"no map reaches such a tolerance; {time}"
+    # what the smallest map takes, so that probing is not begun in vain
+    least = 0.3 + SMALLEST * (1e-6 + cost * natural_horizon(body) / 8) * (2.5 if spec.carry_jacobi else 1.0)
+    if not isinstance(model_of(body), CompiledModel):
+        return [], f"{body!r} has no compiled sphere map nor a doubly periodic chart"
+    if direct < least:
+        return [], time
+    try:
+        found = candidates(spec, model_of(body), cost)
+    except ToleranceError as error:
+        return [], str(error)
+    assert spec.length is not None
+    expected = found[0].seconds(spec.n_rays, spec.length)
+    # estimates err, and so do the gains that they promise
+    return found, f"{time}, with a map {expected:.2g} s" if expected > WORTH * direct else ""
+
+
+def _untuned_direct(body: Surface, length: float, n_steps: int, tolerance: float) -> DirectFlow:
+    """Direct flow with adapted steps, measured on a few rays: for so little work that tuning would take longer."""
+    states = pack(*random_bundle_points(body, 64, rng=np.random.default_rng(2)))
+    times = np.array([length])
+    exact = trace_states(body, states, times, rtol=float(np.clip(1e-4 * tolerance, 1e-14, 1e-10)))[:, 0]
+    rtol = float(np.clip(0.1 * tolerance, 1e-14, 1e-3))
+    while True:
+        flow = DirectFlow(body, rtol, length / n_steps)
+        error = np.linalg.norm(flow.transport(states, times)[:, 0] - exact, axis=1)
+        rms = float(np.sqrt(np.mean(error**2)))
+        if rms <= 0.3 * tolerance:
+            return replace(flow, error=ErrorEstimate(rms, float(error.max()), len(states)))
+        if rtol <= 1e-14:
+            raise ToleranceError(
+                f"direct integration reaches rms {rms:.1e} after {length:g}, not {tolerance:.1e}; "
+                "rounding grows along such rays: shorten them or loosen the tolerance",
+                rms=rms,
+            )
+        rtol = max(0.1 * rtol, 1e-14)
+
+
+def tuned_direct(
+    body: Surface, length: float, n_steps: int, tolerance: float, carry_jacobi: bool
+) -> tuple[DirectFlow, float]:
+    """Direct flow with the longest equal steps that meet the tolerance, and its nominal seconds a ray.
+
+    Raises
+    ------
+    ToleranceError
+        If it does not meet the tolerance with steps as short as 1e-3 body sizes.
+    """
+    horizon = length / n_steps
+    cost = tracing_cost(body)
+    count = int(np.clip(BUDGET / (cost * length), 32, SAMPLES))
+    times = np.array([length])
+    reference = float(np.clip(1e-3 * tolerance, 1e-14, 1e-9))
+    rng = np.random.default_rng(2)
+
+    def errors(number: int) -> FloatArray:
+        states = pack(*random_bundle_points(body, number, rng=rng))
+        exact = trace_states(body, states, times, rtol=reference)
+        found = trace_states(body, states, times, rtol=0.0, step=length / steps)
+        return np.asarray(np.linalg.norm(found - exact, axis=2))
+
+    steps = max(1, int(np.ceil(length / (0.3 * size(body)))))
+    reached = np.inf
+    for _ in range(12):
+        try:
+            error = sampled_errors(errors, count, 1 if 4 * cost * length * count > BUDGET else 16)[:, 0]
+            reached = upper_bound(error)
+        except IntegrationError:
+            reached = np.inf
+        if reached <= tolerance:
+            error_estimate = ErrorEstimate(float(np.sqrt(np.mean(error**2))), float(error.max()), len(error))
+            flow = DirectFlow(
+                body, float(np.clip(1e-2 * tolerance, 1e-13, 1e-8)), horizon, length / steps, error_estimate
+            )
+            return flow, direct_seconds(flow, length, n_steps, carry_jacobi=carry_jacobi)
+        # an order below the method's own while it has not set in
+        factor = (reached / (0.5 * tolerance)) ** (1 / 7.5) if np.isfinite(reached) else 2.0
+        steps = int(np.ceil(steps * np.clip(factor, 1.1, 2.0)))
+        if length / steps < 1e-3 * size(body):
+            break
+    raise ToleranceError(
+        f"direct integration with steps of {length / steps:.2g} reaches rms {reached:.1e} after {length:g}, not "
+        f"{tolerance:.1e}; rounding grows along such rays: shorten them or loosen the tolerance",
+        rms=reached,
+    )

@@ -265,7 +265,8 @@ class _Probe:
         self.axes = (1, 2) if model.is_flat else (0, 1, 2)
         # errors in the units of (x, p) from those of the coordinates
         self.scale = model.unit * (1.0 if model.name == "ambient" else float(np.hypot(1, size(body))))
-        step = horizons[0] / max(1, np.ceil(horizons[0] / (0.5 * size(body))))
+        # short steps tell which of two rotations a long displacement is
+        step = horizons[0] / np.ceil(horizons[0] / (0.5 * min(size(body), natural_horizon(body))))
         times = step * np.arange(1, round(horizons[-1] / step) + 1)
         self.rows = {axis: self._row(body, model, axis, np.array(horizons), times) for axis in self.axes}
 

@@ -33,6 +33,12 @@ def test_horizon_divides_the_distance_of_outputs():
     assert (0.3 / flow.horizon) % 1 == pytest.approx(0, abs=1e-9)
 
 
+def test_a_long_horizon_is_followed_while_its_grid_is_sought():
+    """On a torus a ray turns more than once over two natural horizons: of the ends alone it is not known how often."""
+    flow = cr.build_phase_map(sc.Torus(1.0, 0.4), tolerance=1e-3, length=4.0, horizon=1.0, cache=False)
+    assert flow.horizon == 1.0 and flow.growth.bound <= 1e-3
+
+
 def test_chaos_is_said(rng):
     body = sc.TwistedEllipsoid()
     flow = cr.build_phase_map(body, tolerance=1e-4, length=8.0, carry_jacobi=False, cache=False)

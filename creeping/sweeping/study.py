@@ -13,9 +13,8 @@ from creeping.errors import InvalidInputError
 from creeping.geometry.parts import why_no_rays
 from creeping.geometry.surface import Surface, size
 from creeping.rays.reach import AUTO
-from creeping.storage.folder import content_digest
 from creeping.storage.reading import text_of
-from creeping.sweeping.plan import array_digest, too_large
+from creeping.sweeping.plan import too_large
 from creeping.sweeping.request import (
     METHODS,
     MOST_RAYS,
@@ -25,7 +24,7 @@ from creeping.sweeping.request import (
     sweep_length,
     sweep_request,
 )
-from creeping.sweeping.studyfile.schema import Key, nearest, read_directions, read_table
+from creeping.sweeping.study_tables import Key, count, nearest, one_of, read_directions, read_table
 
 MOST_BYTES = 100_000_000
 EXAMPLE = """\
@@ -49,35 +48,37 @@ tolerance = 1e-6
 [run]
 output = "sweep.zarr"
 """
-STUDY = {
-    "name": Key("text", "", blank=True),
-    "body": Key("text", "", required=True),
-    "units": Key("text"),
-    "speed": Key("text"),
+FILE = {
     "strict": Key("flag", False),
     "part": Key("text"),
     "cap": Key("positive"),
     "union": Key("flag", False),
     "subdivide": Key("text"),
     "sew": Key("positive"),
-    "surface": Key("text", choices=("smooth", "facets", "auto")),
-    "quantity": Key("text", "monostatic", choices=QUANTITIES),
-    "boundary": Key("texts"),
-    "wavenumbers_per_length": Key("wavenumbers", ()),
-    "rays": Key("count", 256, most=MOST_RAYS),
-    "steps": Key("count", most=MOST_STEPS),
-    "order": Key("count", most=2),
-    "method": Key("text", choices=METHODS),
-    "accuracy": Key("positive"),
-    "length": Key("length"),
-    "length_in_body_sizes": Key("positive"),
+    "surface": Key(one_of("smooth", "facets", "auto")),
 }
-_AS_LIST = 'write [{}] and below it kind = "list" and directions = [[x, y, z], ...], or another kind'
-FLOW = {"kind": Key("text", "auto", choices=("auto", "map", "direct")), "tolerance": Key("positive", 1e-6)}
-RUN = {
-    "chunk": Key("count", most=1_000_000),
-    "workers": Key("count", most=10_000),
-    "output": Key("text"),
+"""Options of a body from a file."""
+BODY = {
+    "name": Key("any text", ""),
+    "body": Key("text", "", required=True),
+    "units": Key("text"),
+    "speed": Key("text"),
+}
+TABLES: dict[str, dict[str, Key]] = {
+    "study": {
+        "quantity": Key(one_of(*QUANTITIES), "monostatic"),
+        "boundary": Key("texts"),
+        "wavenumbers_per_length": Key("wavenumbers", ()),
+        "rays": Key(count(MOST_RAYS), 256),
+        "steps": Key(count(MOST_STEPS)),
+        "order": Key(count(2)),
+        "method": Key(one_of(*METHODS)),
+        "accuracy": Key("positive"),
+        "length": Key("length"),
+        "length_in_body_sizes": Key("positive"),
+    },
+    "flow": {"kind": Key(one_of("auto", "map", "direct"), "auto"), "tolerance": Key("positive", 1e-6)},
+    "run": {"chunk": Key(count(1_000_000)), "workers": Key(count(10_000)), "output": Key("text")},
 }
 
 
@@ -120,24 +121,6 @@ class Study:
     output: str | None
     text: str
     folder: Path
-
-    @property
-    def asked(self) -> dict[str, Any]:
-        """What led to body and flow, as text and numbers."""
-        named = ("body", "units", "speed", "file", "flow", "tolerance")
-        return {name: getattr(self, name) for name in named}
-
-    @property
-    def digest(self) -> str:
-        """Of all that changes results: not of the name, comments, or how the sweep is run."""
-        return content_digest(
-            {
-                **self.asked,
-                "request": repr(self.request),
-                "length_in": self.length_in,
-                "incidences": array_digest(self.incidences),
-            }
-        )
 
     def request_for(self, body: Surface) -> SweepRequest:
         """Request with the length of the rays in L; for a body without rays one that does not ask for them."""
@@ -188,20 +171,21 @@ def parse_study(text: str, *, folder: Path, name: str = "the study") -> Study:
         raise InvalidInputError(f"{name} is empty; start from what 'creeping sweep --example' prints")
     mistakes: list[str] = []
     known = ("study", "incidences", "observation", "flow", "run")
-    observed: bool | None = "observation" in tables
-    main = tables.get("study", {"body": "?"})
-    if isinstance(main, dict) and "observation" in main and not observed:
-        main = {key: value for key, value in main.items() if key != "observation"}
-        mistakes.append(f"[study] observation is a table of its own: {_AS_LIST.format('observation')}")
-        observed = None
     for key, value in tables.items():
         if key not in known:
             what = "unknown table" if isinstance(value, dict) else "a key outside of the tables"
             mistakes.append(f"{key}: {what}{nearest(key, known)}")
     mistakes += [f"the table [{key}] is missing" for key in ("study", "incidences") if key not in tables]
-    main = read_table("study", main, STUDY, mistakes)
-    flow = read_table("flow", tables.get("flow", {}), FLOW, mistakes)
-    run = read_table("run", tables.get("run", {}), RUN, mistakes)
+    table = tables.get("study", {"body": "?"})
+    as_list = 'write [{}] and below it kind = "list" and directions = [[x, y, z], ...], or another kind'
+    observed: bool | None = "observation" in tables
+    if isinstance(table, dict) and "observation" in table and not observed:
+        table = {key: value for key, value in table.items() if key != "observation"}
+        mistakes.append(f"[study] observation is a table of its own: {as_list.format('observation')}")
+        observed = None
+    main = read_table("study", table, BODY | FILE | TABLES["study"], mistakes)
+    flow = read_table("flow", tables.get("flow", {}), TABLES["flow"], mistakes)
+    run = read_table("run", tables.get("run", {}), TABLES["run"], mistakes)
     if not 1e-12 <= flow["tolerance"] <= 1e-1:
         mistakes.append(f"[flow] tolerance = {flow['tolerance']:g} is not between 1e-12 and 1e-1")
     sets: dict[str, FloatArray | None] = {}
@@ -209,7 +193,7 @@ def parse_study(text: str, *, folder: Path, name: str = "the study") -> Study:
         if isinstance(tables.get(key), dict):
             sets[key] = read_directions(key, tables[key], folder, mistakes)
         elif key in tables:
-            mistakes.append(f"{key} is not a table: {_AS_LIST.format(key)}")
+            mistakes.append(f"{key} is not a table: {as_list.format(key)}")
             observed = None if key == "observation" else observed
     if main["length"] is not None and main["length_in_body_sizes"] is not None:
         mistakes.append("[study] length and length_in_body_sizes are both given; give one")
@@ -217,13 +201,11 @@ def parse_study(text: str, *, folder: Path, name: str = "the study") -> Study:
     if mistakes or request is None:
         count = "1 mistake" if len(mistakes) == 1 else f"{len(mistakes)} mistakes"
         raise InvalidInputError(f"{name} has {count}:\n  " + "\n  ".join(mistakes), mistakes=mistakes)
-    kept = {key: main[key] for key in ("name", "body", "units", "speed")}
-    file = {key: main[key] for key in ("strict", "part", "cap", "union", "subdivide", "sew", "surface")}
     incidences = sets["incidences"]
     assert incidences is not None
     return Study(
-        **kept,
-        file=file,
+        **{key: main[key] for key in BODY},
+        file={key: main[key] for key in FILE},
         request=request,
         length_in=_length_in(main),
         incidences=incidences,
@@ -248,23 +230,16 @@ def _request(
 
     ``observed`` says whether there is a table [observation], None if one is meant and a mistake is told already.
     """
-    quantity = main["quantity"]
-    if quantity != "rays" and main["steps"] is not None:
-        mistakes.append(f'[study] steps goes with quantity "rays"; "{quantity}" chooses its own')
-    if quantity == "rays" and main["order"] is not None:
-        mistakes.append('[study] order goes with a field; quantity "rays" has none')
-    if quantity == "rays" and main["method"] is not None:
-        mistakes.append('[study] method goes with a field; quantity "rays" has none')
-    if quantity != "rays" and main["speed"] is not None:
-        mistakes.append(f'[study] speed goes with quantity "rays"; a field ("{quantity}") is for constant speed')
+    quantity, fields = main["quantity"], main["quantity"] != "rays"
+    for key in ("steps", "speed") if fields else ("order", "method"):
+        if main[key] is not None:
+            mistakes.append(f'[study] {key} goes with {"quantity" if fields else "a field, not"} "rays"')
     if observed is not None and (quantity == "bistatic") != observed:
         there = (
             'is missing: quantity "bistatic" needs it' if not observed else f'goes with "bistatic", not "{quantity}"'
         )
         mistakes.append(f"the table [observation] {there}")
-    boundary = main["boundary"]
-    if boundary is None:
-        boundary = () if quantity == "rays" else ("soft",)
+    boundary = ("soft",) * fields if main["boundary"] is None else main["boundary"]
     try:
         request = sweep_request(
             quantity,
@@ -276,7 +251,7 @@ def _request(
             # a mistake of its own is told already
             observation=seen if seen is not None or quantity != "bistatic" else (0, 0, 1),
             order=main["order"] or 2,
-            method="rays" if quantity == "rays" else main["method"] or "rays",
+            method=(fields and main["method"]) or "rays",
             accuracy=main["accuracy"],
         )
     except InvalidInputError as error:

@@ -1,15 +1,11 @@
-"""Keys of study files: what a table may hold, and the mistakes of one that holds something else.
-
-Also here: tables of directions in study files: kinds of sets, and files that hold them.
-"""
+"""Tables of study files: what keys may hold, the mistakes of one that holds something else, and sets of directions."""
 
 import difflib
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from tokenize import TokenError
-from typing import Literal
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,53 +24,131 @@ from creeping.geometry.directions import (
 )
 from creeping.storage.reading import text_of
 from creeping.sweeping.plan import short
+from creeping.sweeping.request import MOST_WAVENUMBERS
 
-LEAST_WAVENUMBER, LARGEST_WAVENUMBER = 1e-12, 1e12
+WAVENUMBERS = (1e-12, 1e12)
 """Whatever the unit of length, from nanometres to the size of the sun: the phase of a larger one has no digits left."""
-WORDS = {
-    "text": "a text in quotes, not empty",
-    "texts": "a text in quotes, or a list of them",
-    "flag": "true or false",
-    "count": "a whole number >= 1",
-    "number": "a finite number",
-    "positive": "a positive finite number",
-    "length": 'a positive finite number or "auto"',
-    "wavenumbers": f"a positive number from {LEAST_WAVENUMBER:g} to {LARGEST_WAVENUMBER:g}, a list of them, or "
-    "{ first = ..., last = ..., count = ... } with a count up to 100000",
-    "vector": "three finite numbers, [x, y, z]",
-}
 LINE_BYTES = 100
 """Bytes of a line of three numbers in a file, at most."""
 
 
-@dataclass(frozen=True)
-class Key:
-    """One key of a table: kind of its value, default, the only values allowed, and the largest count or length."""
+class Kind(NamedTuple):
+    """What a value should be, in words; whether one is; and what is made of it."""
 
-    kind: Literal["text", "texts", "flag", "count", "number", "positive", "length", "wavenumbers", "vector", "vectors"]
+    words: str
+    fits: Callable[[Any], bool]
+    made: Callable[[Any], Any] = lambda value: value
+
+
+class Key(NamedTuple):
+    """One key of a table: kind of its value, or its name in VALUES, default, and whether it must be there."""
+
+    kind: Kind | str
     default: Any = None
     required: bool = False
-    choices: tuple[str, ...] = ()
-    most: int = 100_000_000
-    blank: bool = False
+
+
+def one_of(*names: str) -> Kind:
+    """One of some texts."""
+    words = " or ".join(f'"{name}"' for name in names)
+    return Kind(words, lambda value: isinstance(value, str) and value in names)
+
+
+def count(most: int) -> Kind:
+    """A whole number from 1 on."""
+    return Kind(f"a whole number from 1 to {most}", lambda value: _whole(value) and 1 <= value <= most)
+
+
+def _whole(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def _finite(value: Any) -> bool:
+    if not (_whole(value) or isinstance(value, float)):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        # a whole number that is no float
+        return False
+
+
+def _positive(value: Any) -> bool:
+    return _finite(value) and bool(value > 0)
+
+
+def _plain(value: Any) -> Any:
+    """A float instead of a whole number beyond those of numpy."""
+    return float(value) if _whole(value) and abs(value) > 2**53 else value
+
+
+def _vector(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 3 and all(map(_finite, value))
+
+
+def _list_of(value: Any, test: Callable[[Any], bool]) -> bool:
+    return isinstance(value, list) and len(value) > 0 and all(map(test, value))
+
+
+def _wavenumbers(value: Any) -> bool:
+    def fits(one: Any) -> bool:
+        return _finite(one) and WAVENUMBERS[0] <= one <= WAVENUMBERS[1]
+
+    if isinstance(value, dict):
+        ends = all(fits(value.get(name)) for name in ("first", "last"))
+        return ends and count(MOST_WAVENUMBERS).fits(value.get("count")) and set(value) == {"first", "last", "count"}
+    return _list_of(value if isinstance(value, list) else [value], fits)
+
+
+def _made_wavenumbers(value: Any) -> tuple[float, ...]:
+    if isinstance(value, dict):
+        return tuple(np.linspace(float(value["first"]), float(value["last"]), value["count"]).tolist())
+    return tuple(map(float, value if isinstance(value, list) else [value]))
+
+
+VALUES = {
+    "text": Kind("a text in quotes, not empty", lambda value: isinstance(value, str) and bool(value.strip())),
+    "any text": Kind("a text in quotes", lambda value: isinstance(value, str)),
+    "texts": Kind(
+        "a text in quotes, or a list of them",
+        lambda value: isinstance(value, str) or _list_of(value, lambda one: isinstance(one, str)),
+        lambda value: (value,) if isinstance(value, str) else tuple(value),
+    ),
+    "flag": Kind("true or false", lambda value: isinstance(value, bool)),
+    "number": Kind("a finite number", _finite, _plain),
+    "positive": Kind("a positive finite number", _positive, _plain),
+    "length": Kind('a positive finite number or "auto"', lambda value: value == "auto" or _positive(value), _plain),
+    "wavenumbers": Kind(
+        f"a positive number from {WAVENUMBERS[0]:g} to {WAVENUMBERS[1]:g}, a list of them, or "
+        f"{{ first = ..., last = ..., count = ... }} with a count up to {MOST_WAVENUMBERS}",
+        _wavenumbers,
+        _made_wavenumbers,
+    ),
+    "vector": Kind("three finite numbers, [x, y, z]", _vector),
+    "vectors": Kind(f"a list of [x, y, z], at most {MOST}", lambda v: _list_of(v, _vector) and len(v) <= MOST),
+}
 
 
 def read_table(name: str, table: Any, keys: dict[str, Key], mistakes: list[str]) -> dict[str, Any]:
     """Values of a table by key, defaults for those that it lacks; mistakes are added to the list."""
     values = {key: known.default for key, known in keys.items()}
+    kinds = {key: VALUES[known.kind] if isinstance(known.kind, str) else known.kind for key, known in keys.items()}
     if not isinstance(table, dict):
         mistakes.append(f"{name} is not a table; write [{name}] above its keys")
         return values
     for key, value in table.items():
         if key not in keys:
             mistakes.append(f"[{name}] {key}: unknown key{nearest(key, keys)}")
-        elif (reason := _mistake(value, keys[key])) is not None:
-            mistakes.append(f"[{name}] {key} = {_shown(value)} is not {reason}")
+        elif not kinds[key].fits(value):
+            shown = short(f'"{value}"' if isinstance(value, str) else value)
+            mistakes.append(f"[{name}] {key} = {shown} is not {kinds[key].words}")
         else:
-            values[key] = _converted(value, keys[key].kind)
-    for key, known in keys.items():
-        if known.required and key not in table:
-            mistakes.append(f"[{name}] {key} is missing: {_wanted(known)}")
+            values[key] = kinds[key].made(value)
+    mistakes += [
+        f"[{name}] {key} is missing: {kinds[key].words}"
+        for key, known in keys.items()
+        if known.required and key not in table
+    ]
     return values
 
 
@@ -85,113 +159,34 @@ def nearest(word: str, known: Iterable[str]) -> str:
     return f"; did you mean {close[0]}?" if close else f"; known are {', '.join(names)}"
 
 
-def _mistake(value: Any, key: Key) -> str | None:
-    """What the value should be and is not."""
-    tests: dict[str, Callable[[], bool]] = {
-        "text": lambda: isinstance(value, str) and (key.blank or bool(value.strip())),
-        "texts": lambda: isinstance(value, str) or _list_of(value, lambda v: isinstance(v, str)),
-        "flag": lambda: isinstance(value, bool),
-        "count": lambda: isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= key.most,
-        "number": lambda: _finite(value),
-        "positive": lambda: _finite(value) and value > 0,
-        "length": lambda: value == "auto" or (_finite(value) and value > 0),
-        "wavenumbers": lambda: _wavenumbers(value),
-        "vector": lambda: _vector(value),
-        "vectors": lambda: _list_of(value, _vector) and len(value) <= key.most,
-    }
-    fits = tests[key.kind]() and (not key.choices or value in key.choices)
-    return None if fits else _wanted(key)
-
-
-def _wanted(key: Key) -> str:
-    if key.choices:
-        return " or ".join(f'"{choice}"' for choice in key.choices)
-    if key.kind == "count" and key.most < 100_000_000:
-        return f"a whole number from 1 to {key.most}"
-    if key.kind == "vectors":
-        return f"a list of [x, y, z], at most {key.most} of them"
-    return WORDS[key.kind]
-
-
-def _converted(value: Any, kind: str) -> Any:
-    if kind == "texts":
-        return (value,) if isinstance(value, str) else tuple(value)
-    if kind == "wavenumbers" and isinstance(value, dict):
-        return tuple(np.linspace(float(value["first"]), float(value["last"]), value["count"]).tolist())
-    if kind in ("number", "positive", "length") and isinstance(value, int) and abs(value) > 2**53:
-        # beyond the whole numbers of numpy
-        return float(value)
-    if kind == "wavenumbers":
-        return tuple(map(float, value if isinstance(value, list) else [value]))
-    return value
-
-
-def _wavenumbers(value: Any) -> bool:
-    if isinstance(value, dict):
-        count = value.get("count")
-        ends = all(_wavenumber(value.get(name)) for name in ("first", "last"))
-        whole = isinstance(count, int) and not isinstance(count, bool) and 1 <= count <= 100_000
-        return ends and whole and set(value) == {"first", "last", "count"}
-    return _list_of(value if isinstance(value, list) else [value], _wavenumber)
-
-
-def _wavenumber(value: Any) -> bool:
-    return _finite(value) and bool(LEAST_WAVENUMBER <= value <= LARGEST_WAVENUMBER)
-
-
-def _finite(value: Any) -> bool:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return False
-    try:
-        return math.isfinite(value)
-    except OverflowError:
-        # a whole number that is no float
-        return False
-
-
-def _vector(value: Any) -> bool:
-    return isinstance(value, list) and len(value) == 3 and all(map(_finite, value))
-
-
-def _list_of(value: Any, test: Any) -> bool:
-    return isinstance(value, list) and len(value) > 0 and all(map(test, value))
-
-
-def _shown(value: Any) -> str:
-    return short(f'"{value}"' if isinstance(value, str) else value)
-
-
-_COUNT = {"count": Key("count", 1, required=True, most=MOST)}
-
-
 def _ranges(first: str, second: str) -> dict[str, Key]:
     found: dict[str, Key] = {}
     for name in (first, second):
         found |= {
             f"{name}_deg_min": Key("number", 0.0, required=True),
             f"{name}_deg_max": Key("number", 0.0, required=True),
-            f"{name}_count": Key("count", 1, required=True, most=MOST),
+            f"{name}_count": Key(count(MOST), 1, required=True),
         }
     return found
 
 
 KINDS: dict[str, dict[str, Key]] = {
-    "fibonacci": _COUNT,
-    "lebedev": {"order": Key("count", 3, required=True)},
+    "fibonacci": {"count": Key(count(MOST), 1, required=True)},
+    "lebedev": {"order": Key(count(MOST), 3, required=True)},
     "grid": {
-        "theta_count": Key("count", 1, required=True, most=MOST),
-        "phi_count": Key("count", 1, required=True, most=MOST),
+        "theta_count": Key(count(MOST), 1, required=True),
+        "phi_count": Key(count(MOST), 1, required=True),
     },
     "theta-phi": _ranges("theta", "phi"),
     "azimuth-elevation": _ranges("azimuth", "elevation"),
     "great-circle": {
         "first": Key("vector", required=True),
         "through": Key("vector", required=True),
-        **_COUNT,
+        "count": Key(count(MOST), 1, required=True),
         "angle_deg_min": Key("number", 0.0),
         "angle_deg_max": Key("number", 360.0),
     },
-    "list": {"directions": Key("vectors", required=True, most=MOST)},
+    "list": {"directions": Key("vectors", required=True)},
     "file": {"path": Key("text", "", required=True)},
 }
 

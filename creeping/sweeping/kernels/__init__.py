@@ -1,1 +1,0 @@
-"""Compiled sums over the nodes of a stencil."""

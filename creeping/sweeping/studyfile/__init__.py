@@ -1,1 +1,0 @@
-"""Study files: a sweep described in TOML."""
