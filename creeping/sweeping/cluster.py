@@ -198,11 +198,13 @@ def _outcomes(
                 raise CreepingError(
                     f"the cluster has had no worker for {PATIENCE:.0f} s; start workers; what is done is kept: resume"
                 )
-            done: Any = ()
+            done = set[Any]()
             # a second without an outcome is no failure
             with client.as_current(), suppress(TimeoutError):
                 done = distributed.wait(list(flying), timeout=1.0, return_when="FIRST_COMPLETED").done
-            for future in done:
+            while done:
+                # no reference is kept: results of what has been told are released
+                future = done.pop()
                 yield flying.pop(future), _outcome(future)
     except CancelledError as error:
         raise CreepingError(
