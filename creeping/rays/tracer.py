@@ -91,7 +91,7 @@ class RayTracer:
         self.steps = max(16, int(np.ceil(length * sharpest_curvature(body) / turn)))
         self.step = length / self.steps
         nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
-        self._rule = polynomial_matrix(), 0.5 * (nodes + 1), 0.5 * weights
+        self._rule = polynomial_matrix(GUARD), 0.5 * (nodes + 1), 0.5 * weights
 
     def onto_line(self, points: FloatArray, directions: FloatArray, steps: int = 4) -> tuple[FloatArray, FloatArray]:
         """Points of the shadow lines next to the given ones, and T there: (n, 3), (n, 3)."""

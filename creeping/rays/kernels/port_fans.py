@@ -23,7 +23,8 @@ from numba import njit
 
 from creeping.kernels.block import copy
 from creeping.kernels.block import strict_options as options
-from creeping.rays.kernels.quantities import curvatures_along
+from creeping.rays.kernels.quantities import curvatures_along, polynomial_weights
+from creeping.rays.quantities import SHARPEST, STEEPEST
 
 BEHIND, AHEAD = 2, 3
 """Nodes that polynomials take before and behind an interval."""
@@ -36,8 +37,8 @@ LANES, PARTS = 21, 5
 """Their number, and that of the integrals."""
 START = 3
 """Of the port itself: kappa, T and B."""
-STEEPEST, SHARPEST, TURNED = 4.0, 20.0, 1.5
-"""Bounds of |rho'|, of |rho rho''| and |B|, and of rho |g|: beyond, the expansion has no meaning."""
+TURNED = 1.5
+"""Bound of rho |g|, as of |rho'|, |rho rho''| and |B|: beyond, the expansion has no meaning."""
 NODES = BEHIND + AHEAD + 1
 TRIES, CLOSE = 12, 1e-11
 """Newton steps, and the last one of them in cells."""
@@ -169,49 +170,30 @@ def _stretch(rates, row, k, step, central):
 
 
 @njit(**options)
-def _weights(u, value, slope):
-    """Lagrange weights of NODES places -BEHIND ... AHEAD at u, and their derivatives."""
-    for j in range(NODES):
-        product, total = 1.0, 0.0
-        for i in range(NODES):
-            if i != j:
-                part = 1.0
-                for q in range(NODES):
-                    if q != j:
-                        part *= (1.0 if q == i else u - (q - BEHIND)) / (j - q)
-                total += part
-                product *= (u - (i - BEHIND)) / (j - i)
-        value[j], slope[j] = product, total
+def _sum(lanes, m, k, aside, along, first, many, out):
+    """Sums of so many lanes from the first, around cell (m, k), by weights (NODES,) in angle and in s."""
+    for lane in range(many):
+        out[lane] = 0.0
+    for i in range(aside.shape[0]):
+        ray = lanes[(m + i - BEHIND) % lanes.shape[0]]
+        for j in range(along.shape[0]):
+            weight = aside[i] * along[j]
+            for lane in range(many):
+                out[lane] += weight * ray[k + j, first + lane]
 
 
 @njit(**options)
-def _point(lanes, m, k, w, point, along, aside):
-    """x and its derivatives in s and angle, in cells, by weights w (4, NODES) of angle and s, around cell (m, k)."""
-    rays = lanes.shape[0]
-    for axis in range(3):
-        point[axis] = along[axis] = aside[axis] = 0.0
-    for i in range(NODES):
-        ray = lanes[(m + i - BEHIND) % rays]
-        for axis in range(3):
-            value = rate = 0.0
-            for j in range(NODES):
-                value += w[2, j] * ray[k + j, axis]
-                rate += w[3, j] * ray[k + j, axis]
-            point[axis] += w[0, i] * value
-            along[axis] += w[0, i] * rate
-            aside[axis] += w[1, i] * value
-
-
-@njit(**options)
-def _refined(lanes, m, k, target, place, w, work):
+def _refined(lanes, matrix, m, k, target, place, w, work):
     """Newton's method for x(angle, s) = target from the place (2,), in cells from node (m, k); returns success."""
     point, along, aside = work[0], work[1], work[2]
     for _ in range(TRIES):
         if not (abs(place[0] - 0.5) < 1.5 and abs(place[1] - 0.5) < 1.5):
             return False
-        _weights(place[0], w[0], w[1])
-        _weights(place[1], w[2], w[3])
-        _point(lanes, m, k, w, point, along, aside)
+        for axis in range(2):
+            polynomial_weights(matrix, place[axis], 1.0, w[axis])
+        _sum(lanes, m, k, w[0, 0], w[1, 0], 0, 3, point)
+        _sum(lanes, m, k, w[0, 0], w[1, 1], 0, 3, along)
+        _sum(lanes, m, k, w[0, 1], w[1, 0], 0, 3, aside)
         aa = ab = bb = ea = eb = 0.0
         for axis in range(3):
             e = target[axis] - point[axis]
@@ -235,15 +217,19 @@ def _refined(lanes, m, k, target, place, w, work):
 
 
 @njit(**options)
-def passed(lanes, last, ports, after, grid, origin, edge, starts, members, pad, folds, owner, found):
+def passed(lanes, last, matrices, ports, order, along, after, pad, folds, owner, found):
     """Where the fan passes ports (n, 3) of numbers above ``after``; returns how many passages there are.
+
+    One that lies on the border of cells may be found in each of them, and where rays merge several times in one.
 
     Parameters
     ----------
     lanes, last
         Of `port_fan`.
-    grid, origin, edge, starts, members
-        Boxes of ports: numbers along the axes (3,), a corner, L, their edge, L, the first member of each, the members.
+    matrices : (NODES, NODES) x 2
+        `polynomial_matrix` of the nodes around a cell, and of the four nearest of them.
+    order, along : (n,), int
+        Numbers of ports by their coordinate of number ``along``.
     pad : float, L
         How far from where rays merge a port counts as close to it.
     folds : (2, n)
@@ -254,10 +240,8 @@ def passed(lanes, last, ports, after, grid, origin, edge, starts, members, pad, 
         itself, and how far polynomials of degree 3 differ in x, L; past ``most`` only counted.
     """
     rays, count = lanes.shape[0], lanes.shape[1]
-    most, total = len(owner), 0
-    first, following = np.full(len(ports), -1), np.empty(most, np.int64)
-    w, work, place, target = np.empty((4, NODES)), np.empty((3, 3)), np.empty(2), np.empty(3)
-    middle, low, high = np.empty(3), np.empty(3, np.int64), np.empty(3, np.int64)
+    most, total, sorted_ = len(owner), 0, ports[order, along]
+    w, work, place, middle = np.empty((2, 3, NODES)), np.empty((3, 3)), np.empty(2), np.empty(3)
     for m in range(rays):
         one, two = lanes[m], lanes[(m + 1) % rays]
         for k in range(BEHIND, count - AHEAD):
@@ -266,95 +250,58 @@ def passed(lanes, last, ports, after, grid, origin, edge, starts, members, pad, 
                 middle[axis] = 0.25 * (one[k, axis] + one[k + 1, axis] + two[k, axis] + two[k + 1, axis])
             for corner in range(4):
                 at = (one[k], one[k + 1], two[k], two[k + 1])[corner]
-                square = 0.0
-                for axis in range(3):
-                    square += (at[axis] - middle[axis]) ** 2
-                radius = max(radius, math.sqrt(square))
-            least = min(min(one[k, 6], one[k + 1, 6]), min(two[k, 6], two[k + 1, 6]))
-            greatest = max(max(one[k, 6], one[k + 1, 6]), max(two[k, 6], two[k + 1, 6]))
-            folded = least < 0.0 < greatest and k > BEHIND
+                radius = max(radius, math.sqrt(_square(at, middle)))
+            least = min(min(one[k, SPREADING], one[k + 1, SPREADING]), min(two[k, SPREADING], two[k + 1, SPREADING]))
+            most_ = max(max(one[k, SPREADING], one[k + 1, SPREADING]), max(two[k, SPREADING], two[k + 1, SPREADING]))
             dead = k + 1 - BEHIND > min(last[m], last[(m + 1) % rays])
+            folded = least < 0.0 < most_ and k > BEHIND and not dead
             reach = PAD * radius
-            wide = reach + pad if folded and not dead else reach
-            for axis in range(3):
-                low[axis] = max(math.floor((middle[axis] - wide - origin[axis]) / edge), 0)
-                high[axis] = min(math.floor((middle[axis] + wide - origin[axis]) / edge), grid[axis] - 1)
-            for bx in range(low[0], high[0] + 1):
-                for by in range(low[1], high[1] + 1):
-                    for bz in range(low[2], high[2] + 1):
-                        box = (bx * grid[1] + by) * grid[2] + bz
-                        for number in range(starts[box], starts[box + 1]):
-                            j = members[number]
-                            if j <= after:
-                                continue
-                            square = 0.0
-                            for axis in range(3):
-                                target[axis] = ports[j, axis]
-                                square += (target[axis] - middle[axis]) ** 2
-                            if square > wide * wide:
-                                continue
-                            if dead:
-                                folds[1, j] = min(folds[1, j], one[k, INTEGRALS])
-                                continue
-                            if folded:
-                                folds[0, j] = min(folds[0, j], one[k, INTEGRALS])
-                            if square > reach * reach:
-                                continue
-                            for start in range(4 if folded else 1):
-                                place[0], place[1] = (start % 2) * 1.0, (start // 2) * 1.0
-                                if not folded:
-                                    place[0] = place[1] = 0.5
-                                if not _refined(lanes, m, k - BEHIND, target, place, w, work):
-                                    continue
-                                if not (-1e-6 < place[0] < 1 + 1e-6 and -1e-6 < place[1] < 1 + 1e-6):
-                                    continue
-                                angle, length = m + place[0], k - BEHIND + place[1]
-                                known, other = False, first[j]
-                                while other >= 0:
-                                    turn = abs(found[other, 0] - angle)
-                                    turn = min(turn, rays - turn)
-                                    known |= turn < 1e-4 and abs(found[other, 1] - length) < 1e-4
-                                    other = following[other]
-                                if known:
-                                    continue
-                                if total < most:
-                                    owner[total], following[total], first[j] = j, first[j], total
-                                    found[total, 0], found[total, 1] = angle, length
-                                    _read(lanes, m, k - BEHIND, place, w, found[total, 2:])
-                                total += 1
+            wide = reach + pad if folded else reach
+            number = np.searchsorted(sorted_, middle[along] - wide)
+            while number < len(ports) and sorted_[number] <= middle[along] + wide:
+                j = order[number]
+                number += 1
+                square = _square(ports[j], middle)
+                if j <= after or square > wide * wide:
+                    continue
+                if dead or folded:
+                    row = 1 if dead else 0
+                    folds[row, j] = min(folds[row, j], one[k, INTEGRALS])
+                if dead or square > reach * reach:
+                    continue
+                # two rays may pass a port in a cell in which neighbours cross: from all its corners
+                for start in range(4 if folded else 1):
+                    place[0], place[1] = (start % 2) * 1.0, (start // 2) * 1.0
+                    if not folded:
+                        place[0] = place[1] = 0.5
+                    if not _refined(lanes, matrices[0], m, k - BEHIND, ports[j], place, w, work):
+                        continue
+                    if not (-1e-6 < place[0] < 1 + 1e-6 and -1e-6 < place[1] < 1 + 1e-6):
+                        continue
+                    if total < most:
+                        owner[total], found[total, 0], found[total, 1] = j, m + place[0], k - BEHIND + place[1]
+                        _read(lanes, matrices, m, k - BEHIND, place, w, found[total, 2:])
+                    total += 1
     return total
 
 
 @njit(**options)
-def _read(lanes, m, k, place, w, out):
+def _square(x, y):
+    """Square of the distance of two points."""
+    return (x[0] - y[0]) ** 2 + (x[1] - y[1]) ** 2 + (x[2] - y[2]) ** 2
+
+
+@njit(**options)
+def _read(lanes, matrices, m, k, place, w, out):
     """All lanes at a place of cell (m, k), those of the port, and the difference of polynomials."""
-    rays = lanes.shape[0]
-    _weights(place[0], w[0], w[1])
-    _weights(place[1], w[2], w[3])
-    for lane in range(LANES):
-        out[lane] = 0.0
-    for lane in range(LANES, LANES + START):
-        out[lane] = 0.0
-    for i in range(NODES):
-        ray = lanes[(m + i - BEHIND) % rays]
-        for j in range(NODES):
-            weight = w[0, i] * w[2, j]
-            for lane in range(LANES):
-                out[lane] += weight * ray[k + j, lane]
-        for lane in range(START):
-            out[LANES + lane] += w[0, i] * ray[BEHIND, CURVATURE + lane]
-    u, v = place[0], place[1]
-    coarse, four = np.zeros(3), np.empty((2, 4))
-    for row in range(2):
-        z = u if row == 0 else v
-        four[row, 0], four[row, 1] = -z * (z - 1) * (z - 2) / 6, (z + 1) * (z - 1) * (z - 2) / 2
-        four[row, 2], four[row, 3] = -(z + 1) * z * (z - 2) / 2, (z + 1) * z * (z - 1) / 6
-    for i in range(4):
-        ray = lanes[(m + i - 1) % rays]
-        for j in range(4):
-            for axis in range(3):
-                coarse[axis] += four[0, i] * four[1, j] * ray[k + j + 1, axis]
-    square = 0.0
-    for axis in range(3):
-        square += (coarse[axis] - out[axis]) ** 2
-    out[LANES + START] = math.sqrt(square)
+    for axis in range(2):
+        polynomial_weights(matrices[0], place[axis], 1.0, w[axis])
+    _sum(lanes, m, k, w[0, 0], w[1, 0], 0, LANES, out)
+    # at the port itself
+    w[1, 1, 1:], w[1, 1, 0] = 0.0, 1.0
+    _sum(lanes, m, BEHIND, w[0, 0], w[1, 1, :1], CURVATURE, START, out[LANES:])
+    coarse = np.zeros(3)
+    for axis in range(2):
+        polynomial_weights(matrices[1], place[axis], 1.0, w[axis])
+    _sum(lanes, m, k, w[0, 0], w[1, 0], 0, 3, coarse)
+    out[LANES + START] = math.sqrt(_square(coarse, out))
