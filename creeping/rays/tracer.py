@@ -26,7 +26,7 @@ from creeping.geometry.piecewise import is_piecewise, piece_ahead, pieces_of
 from creeping.geometry.surface import Surface, size
 from creeping.rays.ends import non_smooth_from
 from creeping.rays.quantities import GAUSS, GUARD, LANES, START_LANES, RayPoints
-from creeping.shadow.moving import moved_onto_lines
+from creeping.shadow.curves import moved_onto_lines
 
 TURN = 0.12
 """Largest angle by which a ray turns in one step: polynomials of degree 9 then err by about 1e-9."""

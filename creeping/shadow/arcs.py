@@ -18,8 +18,7 @@ from creeping.geometry.incident import headings
 from creeping.geometry.surface import Surface, size
 from creeping.shadow.attachment import SAMPLES, LaunchPoints, occluded
 from creeping.shadow.breaks import breaks_of
-from creeping.shadow.curves import Curves
-from creeping.shadow.moving import moved_onto_lines
+from creeping.shadow.curves import Curves, moved_onto_lines
 from creeping.shadow.status import ATTACHED, CONCAVE, OCCLUDED, STATUSES
 
 PROBES = (0.5, 0.2, 0.8)

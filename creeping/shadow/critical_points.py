@@ -17,6 +17,7 @@ import numpy as np
 
 from creeping._typing import FloatArray
 from creeping.errors import SingularIncidenceError
+from creeping.geometry.directions import first_of_equals
 from creeping.geometry.incident import travel
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.triangulation import Triangulation
@@ -97,8 +98,9 @@ def critical_points(body: Surface, wave: FloatArray, mesh: Triangulation) -> Cri
     off = np.abs(body.level(points)) / np.linalg.norm(body.gradient(points), axis=1)
     # at n = +-q/|q|, where the gradient vanishes for any body, 1 - |h| is the square of the error of the point
     found = (np.linalg.norm(g, axis=1) < 1e-8) & (off < 1e-9 * size(body)) & (np.abs(h) < 1 - 1e-8)
-    points, h = points[found], h[found]
-    kept = _distinct(points, 1e-5 * size(body), order=np.argsort(np.abs(h), kind="stable"))
+    order = np.flatnonzero(found)[np.argsort(np.abs(h[found]), kind="stable")]
+    points, h, gap = points[order], h[order], 1e-5 * size(body)
+    kept = first_of_equals(0 * order, lambda i, j: np.linalg.norm(points[i] - points[j], axis=1) <= gap)
     return CriticalPoints(points[kept], h[kept])
 
 
@@ -147,12 +149,3 @@ def _solve(body: Surface, wave: FloatArray, points: FloatArray) -> FloatArray:
         if not len(active):
             break
     return points
-
-
-def _distinct(points: FloatArray, gap: float, order: np.ndarray) -> list[int]:
-    """Numbers of points that are farther than ``gap`` from every earlier one kept."""
-    kept: list[int] = []
-    for k in order.tolist():
-        if not kept or np.min(np.linalg.norm(points[kept] - points[k], axis=1)) > gap:
-            kept.append(k)
-    return kept

@@ -17,8 +17,7 @@ from creeping.errors import InvalidInputError
 from creeping.geometry.checks import unit_of
 from creeping.geometry.incident import REMEDY, headings, spherical
 from creeping.geometry.surface import Surface
-from creeping.shadow.curves import LineNodes, interpolated
-from creeping.shadow.nodes import polished
+from creeping.shadow.curves import LineNodes, interpolated, polished
 from creeping.shadow.panels import PanelCurve, fit_panels
 from creeping.shadow.status import CONCAVE, STATUSES
 

@@ -28,12 +28,12 @@ from creeping.geometry.surface import Surface, normal, size
 from creeping.shadow.arcs import Arcs, finished
 from creeping.shadow.attachment import Arc, LaunchPoints
 from creeping.shadow.curve import ShadowCurve, counted, spelled
-from creeping.shadow.curves import Curves, LineNodes, interpolated
+from creeping.shadow.curves import Curves, LineNodes, interpolated, polished
 from creeping.shadow.edges import EdgePart
-from creeping.shadow.following import followed
-from creeping.shadow.nodes import clearance, line_nodes, polished
+from creeping.shadow.nodes import clearance, line_nodes, prepared
 from creeping.shadow.panels import PanelCurve
 from creeping.shadow.piecewise import launched_from, piecewise_curves
+from creeping.shadow.refinement import followed
 from creeping.shadow.status import NEAR_SINGULAR, STATUSES
 from creeping.storage.memory import within_budget
 
@@ -213,7 +213,7 @@ def shadow_line(
     line, code, distance = line_nodes(body, d)
     panels: tuple[PanelCurve, ...] = ()
     if line is None or code == NEAR_SINGULAR:
-        exact, panels, distance = followed(body, d)
+        exact, panels, distance = followed(body, d, prepared(body).coarsest)
         if line is not None and len(line[0].spacing) == len(panels):
             # the meshes had the right number of curves: the line is theirs, as in a sweep
             panels = ()

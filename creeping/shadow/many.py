@@ -20,11 +20,11 @@ from creeping.kernels.threads import in_threads
 from creeping.shadow.arcs import finished
 from creeping.shadow.attachment import LaunchPoints
 from creeping.shadow.curves import Curves, LineNodes
-from creeping.shadow.following import followed
 from creeping.shadow.line import ShadowLine, shadow_line
 from creeping.shadow.meshes import LineMeshes
 from creeping.shadow.nodes import FORBIDDEN, critical_distances, judged, prepared, traced
 from creeping.shadow.piecewise import launched_from
+from creeping.shadow.refinement import followed
 from creeping.shadow.status import FOLLOWED, OK, SINGULAR
 
 LEAST = 8
@@ -123,7 +123,7 @@ def shadow_lines(body: Surface, directions: FloatArray, n_rays: int, *, every: b
         numbers[row] = np.nan
         launch.put(np.array([row]), LaunchPoints.blank(directions[[row]], n_rays))
         try:
-            nodes, _, v[row] = followed(body, directions[row])
+            nodes, _, v[row] = followed(body, directions[row], meshes.coarsest)
         except SingularIncidenceError as refused:
             status[row], v[row] = SINGULAR, float(getattr(refused, "distance", 0.0))
             continue

@@ -15,8 +15,8 @@ from weakref import ref
 import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
-from creeping.geometry.curvature import gaussian_curvature
-from creeping.geometry.surface import Surface, normal, project
+from creeping.geometry.curvature import gaussian_curvature, parabolic_crossings
+from creeping.geometry.surface import Surface, normal
 from creeping.geometry.triangulation import Triangulation, triangulate
 from creeping.shadow.refinement import halved
 
@@ -128,34 +128,8 @@ def singular_segments(body: Surface, mesh: Triangulation) -> FloatArray:
     K = gaussian_curvature(body, mesh.vertices)
     t, k = np.nonzero((K[mesh.triangles] > 0) != (K[np.roll(mesh.triangles, -1, axis=1)] > 0))
     first, last = mesh.triangles[t, k], mesh.triangles[t, (k + 1) % 3]
-    points = _parabolic(body, mesh.vertices[first], mesh.vertices[last], K[first] > 0)
-    n, a = normal(body, points), _null_direction(body, points)
+    points, n, a, _ = parabolic_crossings(body, mesh.vertices[first], mesh.vertices[last], K[first], K[last])
     # two edges of a triangle are crossed; they follow each other in t
     n, a = n.reshape(-1, 2, 3), a.reshape(-1, 2, 3)
     a[:, 1] *= np.where(np.sum(a[:, 0] * a[:, 1], axis=-1) < 0, -1.0, 1.0)[:, None]
     return np.ascontiguousarray(np.concatenate([n, np.cross(n, a), points.reshape(-1, 2, 3)], axis=-1))
-
-
-def _parabolic(body: Surface, low: FloatArray, high: FloatArray, positive: Any) -> FloatArray:
-    """Points with K = 0 between points of either sign, by bisection on the body: (m, 3) x 2 -> (m, 3)."""
-    middle = low
-    for _ in range(40):
-        middle = project(body, 0.5 * (low + high))
-        same = (gaussian_curvature(body, middle) > 0) == positive
-        low = np.where(same[:, None], middle, low)
-        high = np.where(same[:, None], high, middle)
-    return middle
-
-
-def _null_direction(body: Surface, points: FloatArray) -> FloatArray:
-    """Unit tangents with the least |kappa|: (m, 3) -> (m, 3)."""
-    g, H = body.gradient(points), body.hessian(points)
-    norm = np.linalg.norm(g, axis=-1)
-    n = g / norm[:, None]
-    e = np.cross(n, np.eye(3)[np.argmin(np.abs(n), axis=1)])
-    e /= np.linalg.norm(e, axis=1, keepdims=True)
-    basis = np.stack([e, np.cross(n, e)], axis=1)
-    values, vectors = np.linalg.eigh(basis @ H @ np.swapaxes(basis, 1, 2) / norm[:, None, None])
-    least = np.argmin(np.abs(values), axis=1)
-    chosen = np.take_along_axis(vectors, least[:, None, None], axis=2)[..., 0]
-    return np.asarray(np.einsum("mk,mki->mi", chosen, basis))

@@ -18,11 +18,8 @@ from creeping.kernels.threads import in_slices
 from creeping.shadow.arcs import Arcs, finished
 from creeping.shadow.curves import Curves, LineNodes
 from creeping.shadow.meshes import LineMeshes
-from creeping.shadow.moving import moved_onto_lines
 from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, OK, SINGULAR
 
-NEAR = 1e-3
-"""Longest step, in body sizes, that brings an interpolated point onto the line."""
 FORBIDDEN = 1e-6
 """v of `critical_distances` below which a line counts as one that crosses itself."""
 
@@ -143,8 +140,3 @@ def line_nodes(body: Surface, wave: FloatArray) -> Sought:
         if not onward[0]:
             return Sought(line if certain[0] else None, int(code[0]), float(v[0]))
     raise AssertionError("the last mesh sends no line on")
-
-
-def polished(body: Surface, wave: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Points next to a line moved onto it, with T and kappa_n(q): (n, 3) -> (n, 3), (n, 3), (n,)."""
-    return moved_onto_lines(body, rows_of(wave)[None], points, reach=NEAR * size(body), steps=2)[:3]

@@ -18,8 +18,9 @@ from creeping.geometry.surface import size
 from creeping.shadow.arcs import shared_out
 from creeping.shadow.attachment import Arc, LaunchPoints, occluded
 from creeping.shadow.curve import ShadowCurve
+from creeping.shadow.curves import moved_onto_lines
 from creeping.shadow.edges import EdgePart, parts_on_edges, unit_normals
-from creeping.shadow.panels import PanelCurve, fit_panels, newton_step
+from creeping.shadow.panels import PanelCurve, fit_panels
 from creeping.shadow.piece_curves import PieceCurve, curves_on, edge_on
 from creeping.shadow.status import ATTACHED, CONCAVE, NO_RAY, OCCLUDED, STATUSES
 
@@ -116,8 +117,7 @@ def _finished(
     chords = np.linalg.norm(np.roll(found.nodes, -1, axis=0) - found.nodes, axis=1)
     panels = fit_panels(piece, direction, found.nodes, chords, closed=found.closed, most=MOST_PANELS)
     arclength = np.linspace(0.0, panels.length, n_points, endpoint=not found.closed)
-    points = panels.at(arclength)
-    _, tangents = newton_step(piece, direction, points)
+    points, tangents, curvature, _ = moved_onto_lines(piece, direction, panels.at(arclength), reach=0.0, steps=0)
     arcs = _arcs(body, piece, direction, panels)
     curve = ShadowCurve(
         body=body,
@@ -129,7 +129,7 @@ def _finished(
         length=panels.length,
         error=EXACT,
         status=np.full(n_points, STATUSES[ATTACHED]),
-        curvature=_bent(piece, direction, points),
+        curvature=curvature,
         arcs=arcs,
         nodes=points,
         closed=found.closed,
@@ -141,15 +141,9 @@ def _finished(
     return curve
 
 
-def _bent(piece: Any, direction: FloatArray, points: FloatArray) -> FloatArray:
-    """kappa_n(d) at points (n,), 1/L."""
-    bent = np.einsum("nij,i,j->n", piece.hessian(points), direction, direction)
-    return np.asarray(bent / np.linalg.norm(piece.gradient(points), axis=1))
-
-
 def _states(body: Any, piece: Any, direction: FloatArray, points: FloatArray) -> IntArray:
     """Codes of points of a curve (n,)."""
-    convex = _bent(piece, direction, points) > 0
+    convex = moved_onto_lines(piece, direction, points, reach=0.0, steps=0).curvature > 0
     hidden = occluded(body, points + OUTWARD * size(body) * unit_normals(piece, points), direction)
     return np.where(convex, np.where(hidden, OCCLUDED, ATTACHED), CONCAVE)
 

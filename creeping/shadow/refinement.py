@@ -1,4 +1,6 @@
-"""Closed curves n.q = 0 on the body, their topology from a mesh that is refined until the signs decide it.
+"""A shadow line followed by itself: its topology from a mesh that is refined until the signs decide it, then panels.
+
+The last resort, some tenths of a second a line; what comes out is a `LineNodes` like any other.
 
 Where a triangle could hide a crossing, a loop or a gap, it is split. It cannot if, with h = n.q, its gradient g on the
 body, and e its longest edge,
@@ -13,38 +15,51 @@ Sources: Derivations, R9.
 """
 
 import numpy as np
+from scipy.optimize.elementwise import find_root
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.geometry.incident import travel
 from creeping.geometry.surface import Surface, project, size
 from creeping.geometry.triangulation import Triangulation
-from creeping.shadow.critical_points import CriticalPoints, incidence
-from creeping.shadow.panels import PanelCurve, fit_panels, onto_line
+from creeping.shadow.critical_points import CriticalPoints, critical_points, incidence
+from creeping.shadow.curves import LineNodes, moved_onto_lines
+from creeping.shadow.panels import PanelCurve, fit_panels
 
 MAX_DEPTH = 22
 """Refinements of a triangle, each halving its edges."""
 MAX_TRIANGLES = 400_000
 
 
-def shadow_curves(body: Surface, wave: FloatArray, mesh: Triangulation, critical: CriticalPoints) -> list[PanelCurve]:
-    """Trace the closed curves n.q = 0, exact at every arclength.
+NODES = (512, 16_384)
+"""Fewest and most nodes of a curve."""
+A_PANEL = 24
+"""Nodes on the shortest panel."""
 
-    Parameters
-    ----------
-    body, wave : Surface, (3,) or (4,)
-    mesh : Triangulation
-    critical : CriticalPoints
-        Of n.q, none at n.q = 0; what an error names.
 
-    Returns
-    -------
-    list of PanelCurve
+def followed(body: Surface, wave: FloatArray, mesh: Triangulation) -> tuple[LineNodes, tuple[PanelCurve, ...], float]:
+    """Nodes of the line of a wave, (3,) or (4,), its curves in panels, and the least |n.q|/|q| at a critical point.
 
     Raises
     ------
     SingularIncidenceError
-        If the topology is not settled at the finest mesh.
+        If the line crosses itself, or so nearly that its curves cannot be told apart.
     """
+    critical = critical_points(body, wave, mesh)
+    critical.refuse()
+    curves = tuple(sorted(_curves(body, wave, mesh, critical), key=lambda curve: -curve.length))
+    points, spacing = [], []
+    for curve in curves:
+        shortest = float(np.min(np.diff(curve.breaks)))
+        count = int(np.clip(np.ceil(A_PANEL * curve.length / shortest), *NODES))
+        points.append(curve.at(curve.length * np.arange(count) / count))
+        spacing.append(curve.length / count)
+    x, T, kappa, _ = moved_onto_lines(body, wave, np.concatenate(points), reach=0.0, steps=0)
+    starts = np.cumsum([0, *map(len, points)]).astype(np.int64)
+    # panels are exact to rounding
+    return LineNodes(x, T, kappa, starts, np.array(spacing), error=1e-12), curves, critical.distance
+
+
+def _curves(body: Surface, wave: FloatArray, mesh: Triangulation, critical: CriticalPoints) -> list[PanelCurve]:
     mesh, h = _resolve(body, wave, mesh, critical)
     edges, sides = _edges(mesh.triangles)
     loops = _loops(sides, h[mesh.triangles] >= 0)
@@ -55,7 +70,7 @@ def shadow_curves(body: Surface, wave: FloatArray, mesh: Triangulation, critical
         raise _unsettled(
             critical, f"has {len(loops)} curves on one mesh and {len(again)} on the next; it nearly crosses itself"
         )
-    return [_curve(body, wave, mesh, edges[loop], h) for loop in loops]
+    return [_curve(body, wave, mesh, edges[loop]) for loop in loops]
 
 
 def _values(body: Surface, wave: FloatArray, points: FloatArray) -> FloatArray:
@@ -184,35 +199,17 @@ def _split(body: Surface, mesh: Triangulation, marked: BoolArray) -> Triangulati
     return Triangulation(np.concatenate([mesh.vertices, middles]), np.concatenate(triangles))
 
 
-def _curve(body: Surface, wave: FloatArray, mesh: Triangulation, ends: IntArray, h: FloatArray) -> PanelCurve:
-    """Curve through the crossings of a loop of edges (k, 2)."""
+def _curve(body: Surface, wave: FloatArray, mesh: Triangulation, ends: IntArray) -> PanelCurve:
+    """Curve through the crossings of a loop of edges (k, 2), on edges brought onto the body."""
     a, b = mesh.vertices[ends[:, 0]], mesh.vertices[ends[:, 1]]
     spacing = np.linalg.norm(b - a, axis=1)
-    nodes = _crossings(body, wave, a, h[ends[:, 0]], b, h[ends[:, 1]])
-    polished = onto_line(body, wave, nodes, reach=1e-3 * size(body))
-    # the bracket holds the branch; a polish that leaves it has gone to another one
-    stayed = np.linalg.norm(polished - nodes, axis=1) < 1e-3 * spacing
-    return fit_panels(body, wave, polished[stayed], spacing[stayed])
 
+    def value(t: FloatArray, k: IntArray) -> FloatArray:
+        return _values(body, wave, project(body, a[k] + t[:, None] * (b - a)[k], iterations=4))
 
-def _crossings(
-    body: Surface, wave: FloatArray, a: FloatArray, ha: FloatArray, b: FloatArray, hb: FloatArray
-) -> FloatArray:
-    """Points with n.q = 0 on edges brought onto the body, by the Illinois rule in t of a + t (b - a): (k, 3)."""
-    low, high = np.zeros(len(a)), np.ones(len(a))
-    h_low, h_high = ha.copy(), hb.copy()
-    moved_high = np.full(len(a), -1)
-    points = a
-    for _ in range(12):
-        t = (low * h_high - high * h_low) / np.where(h_high == h_low, 1.0, h_high - h_low)
-        points = project(body, a + t[:, None] * (b - a), iterations=4)
-        value = _values(body, wave, points)
-        if np.max(np.abs(value)) < 1e-9:
-            break
-        to_high = (value >= 0) == (h_high >= 0)
-        # an end kept twice has its value halved, so that both ends close in
-        h_low = np.where(to_high, np.where(moved_high == 1, 0.5 * h_low, h_low), value)
-        h_high = np.where(to_high, value, np.where(moved_high == 0, 0.5 * h_high, h_high))
-        moved_high = to_high.astype(int)
-        low, high = np.where(to_high, low, t), np.where(to_high, t, high)
-    return np.asarray(points)
+    share = find_root(value, (0.0, 1.0), args=(np.arange(len(a)),), tolerances={"xatol": 1e-9}).x
+    nodes = project(body, a + share[:, None] * (b - a), iterations=4)
+    moved = moved_onto_lines(body, wave, nodes, reach=1e-3 * size(body), steps=4).points
+    # the bracket holds the branch; a step that leaves it has gone to another one
+    stayed = np.linalg.norm(moved - nodes, axis=1) < 1e-3 * spacing
+    return fit_panels(body, wave, moved[stayed], spacing[stayed])
