@@ -1,24 +1,33 @@
-"""What a body is prepared with for shadow lines at sweep speed: meshes, and its singular directions.
+"""Shadow lines as equally spaced nodes on meshes, and what a body is prepared with for them.
+
+Where no mesh is certain, or next to a singular direction, a line is followed with its topology proven (`refinement`).
 
 The gradient of n.d along the body is S d with S the shape operator. On n.d = 0 it vanishes only where K = 0 and d is
 the null direction a of S there: those directions are singular, and form curves on the sphere. They bound the regions
 in which the number of curves of the line is constant; to first order v = |n.d| at a critical point is the angle to
 them.
 
-Sources: Derivations, R11.
+Sources: Derivations, R6, R8 and R11.
 """
 
 from functools import cached_property
 from threading import RLock
+from typing import NamedTuple
 from weakref import ref
 
 import numpy as np
 
-from creeping._typing import Any, FloatArray, IntArray
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geometry.curvature import gaussian_curvature, parabolic_crossings
-from creeping.geometry.surface import Surface, normal
+from creeping.geometry.evaluators import evaluators
+from creeping.geometry.incident import rows_of
+from creeping.geometry.memo import memo
+from creeping.geometry.surface import Surface, normal, project, size
 from creeping.geometry.triangulation import Triangulation, triangulate
+from creeping.kernels.threads import in_slices
+from creeping.shadow.curves import LineNodes
 from creeping.shadow.refinement import halved
+from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, OK
 
 TIERS = ((2_500, 512), (10_000, 2048), (40_000, 4096))
 """Vertices of the meshes, and nodes of a line on them."""
@@ -133,3 +142,99 @@ def singular_segments(body: Surface, mesh: Triangulation) -> FloatArray:
     n, a = n.reshape(-1, 2, 3), a.reshape(-1, 2, 3)
     a[:, 1] *= np.where(np.sum(a[:, 0] * a[:, 1], axis=-1) < 0, -1.0, 1.0)[:, None]
     return np.ascontiguousarray(np.concatenate([n, np.cross(n, a), points.reshape(-1, 2, 3)], axis=-1))
+
+
+FORBIDDEN = 1e-6
+"""v of `critical_distances` below which a line counts as one that crosses itself."""
+
+
+def prepared(body: Surface) -> LineMeshes:
+    """Meshes of a body, made once."""
+    return memo(body, "line meshes", lambda: LineMeshes(body))
+
+
+def box_of(body: Surface) -> FloatArray:
+    """Bounds as kernels take them: (2, 3), L."""
+    return np.ascontiguousarray(body.bounds, dtype=float)
+
+
+def critical_distances(body: Surface, waves: FloatArray) -> FloatArray:
+    """v, least |n.q|/|q| at critical points of n.q with K = 0, inf without one: (n, 3 or 4) -> (n,).
+
+    Of a point source within one body size no more than its height in body sizes: there its line is a small loop.
+    """
+    rows, ends = rows_of(waves), prepared(body).critical.reshape(-1, 9)
+    n, b, x = (np.ascontiguousarray(ends[:, k : k + 3]) for k in (0, 3, 6))
+    least = np.full(len(rows), np.inf)
+
+    def run(part: slice) -> None:
+        for row in range(part.start, part.stop):
+            d, w = rows[row, :3], rows[row, 3]
+            q = d + w * x if w else np.broadcast_to(d, x.shape)
+            # where q comes to be along the null direction between two ends
+            along = (np.sum(b * q, axis=1) if w else b @ d).reshape(-1, 2)
+            crossed = np.repeat((along[:, 0] > 0) != (along[:, 1] > 0), 2)
+            if crossed.any():
+                value = np.sum(n[crossed] * q[crossed], axis=1) / np.linalg.norm(q[crossed], axis=1)
+                (first, last), (low, high) = along[crossed[::2]].T, value.reshape(-1, 2).T
+                least[row] = np.min(np.abs(low + first / (first - last) * (high - low)))
+
+    in_slices(run, len(rows), multiple=1)
+    for row in np.flatnonzero(rows[:, 3]):
+        height = clearance(body, -rows[row, :3] / rows[row, 3])
+        if height < size(body):
+            least[row] = min(least[row], height / size(body))
+    return least
+
+
+def clearance(body: Surface, point: FloatArray) -> float:
+    """Distance of a point (3,) from the body, L, negative inside; far away, of points 0.04 body sizes apart."""
+    vertices = prepared(body).coarsest.vertices
+    distances = np.linalg.norm(vertices - point, axis=1)
+    height, near = float(np.min(distances)), vertices[[np.argmin(distances)]]
+    for _ in range(16 if height < 0.3 * size(body) else 0):
+        n, away = normal(body, near), point - near
+        # by parts of the way: a foot next to a centre of curvature would be passed
+        near = project(body, near + 0.5 * (away - np.sum(away * n, axis=1, keepdims=True) * n))
+        height = min(height, float(np.linalg.norm(near - point)))
+    return height if float(body.level(point[None])[0]) > 0 else -height
+
+
+def judged(v: FloatArray, certain: BoolArray, turn: float, tier: int) -> tuple[BoolArray, IntArray]:
+    """Which lines go on to the next mesh, and the codes of the others.
+
+    A line is certain if every step was certain of it and the direction is so far from a singular one, v > e^2 with e
+    the mean angle between neighbouring normals, that the mesh cannot have missed a small loop.
+    """
+    far = v > turn * turn
+    last = tier >= LineMeshes.count - 2
+    code = np.where(certain, np.where(far, OK, NEAR_SINGULAR), FOLLOWED)
+    onward = ~certain | (~far & (not last))
+    return (onward if tier < LineMeshes.count - 1 else np.zeros_like(onward)), code
+
+
+class Traced(NamedTuple):
+    """Lines of several waves on one mesh: their nodes, None where there is no line, and whether they are certain."""
+
+    nodes: list[LineNodes | None]
+    certain: BoolArray
+
+
+def traced(body: Surface, waves: FloatArray, tier: int) -> Traced:
+    """Nodes of the lines of waves (n, 4) on a mesh."""
+    from creeping.shadow.kernels.trace import CERTAIN, CURVES, ERROR, FOUND, KNOWN, LEAST_NODES, lines_on_mesh
+
+    mesh, n = prepared(body).packed(tier), len(waves)
+    most = mesh[-1] + (LEAST_NODES + 8) * CURVES
+    x, T, kappa = np.empty((n, most, 3)), np.empty((n, most, 3)), np.empty((n, most))
+    starts, spacing, known = np.empty((n, CURVES + 1), np.int64), np.empty((n, CURVES)), np.zeros((n, KNOWN))
+    with evaluators(body) as parts:
+        extent = float(np.max(np.ptp(box_of(body), axis=0)))
+        lines_on_mesh(*parts[:2], extent, mesh, waves, x, T, kappa, starts, spacing, known)
+    nodes: list[LineNodes | None] = [None] * n
+    for row in np.flatnonzero(known[:, FOUND]):
+        curves = int(known[row, FOUND])
+        own = slice(starts[row, curves])
+        parts_of = x[row, own], T[row, own], kappa[row, own], starts[row, : curves + 1], spacing[row, :curves]
+        nodes[row] = LineNodes(*parts_of, float(known[row, ERROR]))
+    return Traced(nodes, known[:, CERTAIN] > 0)

@@ -25,8 +25,7 @@ from creeping.geometry.arguments import rays_refused
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import RayFan, launch
 from creeping.rays.transport import Flow
-from creeping.shadow.line import ShadowLine, shadow_line
-from creeping.shadow.many import ShadowLines, lines_together
+from creeping.shadow.line import ShadowLine, ShadowLines, lines_together, shadow_line
 from creeping.shadow.status import OK
 from creeping.sweeping.request import VALID, SweepRequest
 

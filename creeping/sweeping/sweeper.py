@@ -25,8 +25,7 @@ from creeping.rays.reach import early_length
 from creeping.rays.strips import Strip, strips_of
 from creeping.rays.tracer import RayTracer
 from creeping.rays.transport import Flow, carried
-from creeping.shadow.line import ShadowLine, shadow_line
-from creeping.shadow.many import ShadowLines, shadow_lines
+from creeping.shadow.line import ShadowLine, ShadowLines, shadow_line, shadow_lines
 from creeping.shadow.status import SINGULAR
 from creeping.sweeping.request import CURVED, VALID, SweepRequest
 from creeping.sweeping.solved_fields import FieldArrays, fill_piecewise, piecewise_lines

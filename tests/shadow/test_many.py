@@ -10,9 +10,8 @@ import creeping as cr
 from creeping.geometry.incident import rows_of
 from creeping.shadow.arcs import finished
 from creeping.shadow.curves import Curves
-from creeping.shadow.many import shadow_lines
-from creeping.shadow.meshes import LineMeshes, neighbours_of
-from creeping.shadow.nodes import prepared
+from creeping.shadow.line import shadow_lines
+from creeping.shadow.meshes import LineMeshes, neighbours_of, prepared
 from creeping.shadow.refinement import followed
 from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, NO_RAY, OK, SINGULAR
 

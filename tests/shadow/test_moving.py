@@ -9,7 +9,7 @@ import creeping as cr
 from creeping.geometry.incident import rows_of
 from creeping.geometry.surface import size
 from creeping.shadow.curves import moved_onto_lines
-from creeping.shadow.many import shadow_lines
+from creeping.shadow.line import shadow_lines
 
 
 def plain_step(body, waves, x):

@@ -47,7 +47,7 @@ from creeping.rays.tracer import TURN, RayTracer
 from creeping.rays.transport import Flow, carried
 from creeping.shadow.attachment import LaunchPoints, occluded
 from creeping.shadow.line import ShadowLine, shares_of
-from creeping.shadow.nodes import prepared
+from creeping.shadow.meshes import prepared
 from creeping.shadow.status import ATTACHED, NO_RAY
 from creeping.storage.memory import within_budget
 

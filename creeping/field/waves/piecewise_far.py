@@ -61,7 +61,7 @@ from creeping.rays.fan import RayFan
 from creeping.rays.specular import SpecularPoints, joined, smooth_parts, some, specular_on_pieces, stand_clear
 from creeping.rays.status import AT_CREASES, RayStatus
 from creeping.shadow.attachment import occluded
-from creeping.shadow.edges import convex, unit_normals
+from creeping.shadow.piecewise import convex, unit_normals
 from creeping.storage.memory import within_budget
 
 WEDGE = 1.0
