@@ -32,7 +32,7 @@ from creeping.shadow.line import ShadowLine
 
 OF_CREASE = {"edge": RayStatus.EDGE, "tip": RayStatus.TIP}
 
-MANY, FEW = 4096, 32
+FEW_RAYS, FEW = 4096, 32
 """Rays that are enough for a line of several arcs to begin with, or so many for each in the mean: of many holes and
 fillets each has as many points as a body's only curve."""
 
@@ -126,7 +126,7 @@ class Starts(NamedTuple):
             shares = [(a.end - a.start) / line.curves[a.curve].length * len(line.curves[a.curve].points) for a in arcs]
             n_rays = sum(max(1, round(share)) for share in shares)
             if len(arcs) > 1:
-                n_rays = min(n_rays, max(MANY, FEW * len(arcs)))
+                n_rays = min(n_rays, max(FEW_RAYS, FEW * len(arcs)))
         launch = line.launch_points(max(n_rays, len(arcs)), launch_from)
         there = np.flatnonzero(launch.there[0])
         _, arc = np.unique(launch.arc_index[0, there], return_inverse=True)

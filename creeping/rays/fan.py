@@ -34,7 +34,7 @@ from creeping.geometry.evaluators import speed_of, speed_values
 from creeping.geometry.memo import memo
 from creeping.geometry.piecewise import has_edges, is_piecewise
 from creeping.geometry.surface import Surface, fingerprint, size
-from creeping.rays.ends import Losses, Starts, ends_of, outline_share
+from creeping.rays.ends import FEW_RAYS, Losses, Starts, ends_of, outline_share
 from creeping.rays.reach import AUTO, HARD_DECAY, IN_RANGE, ray_length
 from creeping.rays.status import AT_CREASES, LAUNCHED, LINE_STATUS, RayStatus
 from creeping.rays.transport import Flow, carried, checked_flow, spread, zeros_passed
@@ -43,7 +43,7 @@ from creeping.shadow.line import ShadowLine, checked_launch_from
 from creeping.shadow.status import NO_RAY
 from creeping.storage.memory import within_budget
 
-MAX_RAYS, GROWTH, FEW_RAYS, HALVED = 200_000, 32, 4096, 4
+MAX_RAYS, GROWTH, HALVED = 200_000, 32, 4
 """Rays beyond which refinement stops, also in units of those asked for, unless few; halvings of gaps at edges."""
 CHECKED_RAYS = 16
 """Rays that are traced directly to measure the error of a fan."""

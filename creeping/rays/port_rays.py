@@ -31,8 +31,6 @@ TURN = 0.2
 RTOL = 1e-9
 """Relative tolerance of rays. Twice as many rays, half of the gaps and steps, and a tenth of the tolerance find the
 same geodesics (``tests/rays/test_port_rays.py``)."""
-NODE_BYTES = 600.0
-"""Of a fan's node: two states with their Jacobi fields, and what is carried."""
 NODES = 400_000
 """Nodes of fans that are held at once: 60 MB."""
 SAME = 1e-4
@@ -146,7 +144,8 @@ def rays_between(
 
     normals = normal(body, ports)
     steps = np.maximum(16, np.ceil(length * sharpest_curvature(body) / TURN))
-    within_budget(NODE_BYTES * RAYS * steps, f"fans of length {length:g}", "give a shorter length", asked=length)
+    # of a node two states with their Jacobi fields, and what is carried
+    within_budget(600.0 * RAYS * steps, f"fans of length {length:g}", "give a shorter length", asked=length)
     steps = int(steps)
     times = length / steps * np.arange(steps + GUARD + 1, dtype=float)
     senders = len(ports) if sources is None else sources

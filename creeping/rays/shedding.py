@@ -16,9 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from creeping._typing import Any, BoolArray, FloatArray, IntArray
+from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.geometry.directions import first_of_equals, tangent_frames
 from creeping.geometry.quadrature import SYMMETRIC, nearest_points
+from creeping.geometry.rows import Rows
 from creeping.geometry.surface import Surface, normal, project, size
 from creeping.rays.quantities import RayPoints
 from creeping.rays.strips import Strip, gather
@@ -33,7 +34,7 @@ CLOSE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class ShedRays:
+class ShedRays(Rows):
     """Rays that reach observers.
 
     Attributes
@@ -55,10 +56,6 @@ class ShedRays:
     sigma: FloatArray
     rays: RayPoints
     reach: FloatArray
-
-    def __getitem__(self, index: Any) -> "ShedRays":
-        """Some of them."""
-        return ShedRays(self.observer[index], self.strip[index], self.sigma[index], self.rays[index], self.reach[index])
 
 
 _Functions = tuple[FloatArray, FloatArray, Callable[[IntArray, IntArray], BoolArray]]

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from creeping._typing import Any, BoolArray, FloatArray, IntArray
+from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.geodesics.equations import sharpest_curvature
 from creeping.geodesics.integrator import trace_states
@@ -23,6 +23,7 @@ from creeping.geodesics.pieces import trace_pieces, trace_to
 from creeping.geodesics.states import M11, M12, M21, M22, P, X, pack
 from creeping.geometry.evaluators import evaluators, speed_of
 from creeping.geometry.piecewise import is_piecewise, piece_ahead, pieces_of
+from creeping.geometry.rows import Rows
 from creeping.geometry.surface import Surface, size
 from creeping.rays.ends import non_smooth_from
 from creeping.rays.quantities import GAUSS, GUARD, LANES, START_LANES, RayPoints
@@ -37,7 +38,7 @@ TOGETHER, TOGETHER_ON_PIECES = 192, 2048
 
 
 @dataclass(frozen=True, eq=False)
-class SingleRays:
+class SingleRays(Rows):
     """Rays (n,), each with its incidence.
 
     Attributes
@@ -58,12 +59,6 @@ class SingleRays:
     tangents: FloatArray
     rays: RayPoints
     risen: BoolArray
-
-    def __getitem__(self, index: Any) -> "SingleRays":
-        """Part of the rays."""
-        return SingleRays(
-            self.directions[index], self.starts[index], self.tangents[index], self.rays[index], self.risen[index]
-        )
 
 
 class RayTracer:

@@ -26,7 +26,7 @@ from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geometry.incident import headings
 from creeping.geometry.surface import Surface, size
 from creeping.shadow.attachment import SAMPLES, LaunchPoints, occluded
-from creeping.shadow.curves import Curves, moved_onto_lines
+from creeping.shadow.curves import NEAR, Curves, moved_onto_lines
 from creeping.shadow.status import ATTACHED, CONCAVE, OCCLUDED, STATUSES
 
 MOST = 64
@@ -230,8 +230,6 @@ PROBES = (0.5, 0.2, 0.8)
 BESIDE = 2
 """Nodes from a break within which an outermost node does not say that its arc is lit: of two curves that nearly touch
 in the picture the hidden one may have it (directions within 0.4 degrees of the axis of two congruent lobes)."""
-NEAR = 1e-2
-"""Longest step, in body sizes, that brings an interpolated point onto the line; kept nodes are much closer."""
 
 
 class Arcs(NamedTuple):

@@ -11,7 +11,6 @@ the ray enters the body where F is negative at a sample, or at a minimum between
 Sources: [K84]; Derivations, R10.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
@@ -22,14 +21,13 @@ from creeping.errors import InvalidInputError
 from creeping.geometry.incident import REMEDY, headings, openings, optical_paths, spherical
 from creeping.geometry.parts import is_faceted, why_no_rays
 from creeping.geometry.piecewise import is_convex, is_piecewise
+from creeping.geometry.rows import Rows
 from creeping.geometry.surface import Surface, size
 from creeping.kernels.threads import in_slices
 from creeping.shadow.status import NO_RAY
 
 SAMPLES = 192
 """Samples of F from a point to where its backward ray leaves the box."""
-MINIMUM = 6
-"""Newton steps to a minimum of F between samples."""
 SLICE = 256
 """Rays at a time."""
 ABOVE = 1e-5
@@ -46,7 +44,7 @@ class Arc(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class LaunchPoints:
+class LaunchPoints(Rows):
     """Places for so many rays on the shadow lines of n incidences.
 
     Attributes
@@ -86,11 +84,6 @@ class LaunchPoints:
         for one in fields(self)[1:]:
             getattr(self, one.name)[rows] = getattr(those, one.name)
 
-    @classmethod
-    def together(cls, parts: Sequence["LaunchPoints"]) -> "LaunchPoints":
-        """Those of several sets of incidences, one after the other."""
-        return cls(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(cls)))
-
     @property
     def directions(self) -> FloatArray:
         """Unit vectors d (n, 3) of plane waves; see `headings` for others."""
@@ -117,10 +110,6 @@ class LaunchPoints:
     def there(self) -> BoolArray:
         """Whether a place holds a ray (n, rays)."""
         return np.asarray(self.curve_index != NO_RAY)
-
-    def of(self, rows: IntArray) -> "LaunchPoints":
-        """Those of some incidences."""
-        return LaunchPoints(*(getattr(self, part.name)[rows] for part in fields(self)))
 
 
 def evenly_chosen(there: BoolArray, most: int) -> BoolArray:
@@ -219,7 +208,7 @@ def occluded(body: Surface, points: FloatArray, direction: FloatArray, reach: Fl
 def _dips(body: Surface, points: FloatArray, d: FloatArray, t: FloatArray, h: FloatArray) -> BoolArray:
     """Whether F < 0 at its minimum on x - t d within h of t: (m, 3), (m, 3), (m,), (m,) -> (m,)."""
     start = t
-    for _ in range(MINIMUM):
+    for _ in range(6):
         x = points - t[:, None] * d
         slope = -np.sum(body.gradient(x) * d, axis=1)
         bend = np.einsum("mi,mij,mj->m", d, body.hessian(x), d)

@@ -7,7 +7,6 @@ Sources: Derivations, R6.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from creeping.geometry.checks import unit_of
 from creeping.geometry.incident import REMEDY, headings, spherical
 from creeping.geometry.surface import Surface
 from creeping.shadow.curves import LineNodes, interpolated, polished
-from creeping.shadow.panels import PanelCurve, fit_panels
+from creeping.shadow.panels import PanelCurve
 from creeping.shadow.status import CONCAVE, STATUSES
 
 
@@ -56,6 +55,8 @@ class ShadowCurve(DrawnOnBody):
         For an open curve, numbers of the creases at its start and end.
     goes_on : tuple of int
         For an open curve, numbers of the curves that continue it across a joint at its start and end; -1 for none.
+    panels : PanelCurve or None
+        The curve exact to rounding: on a piece, and where it turns so fast that its nodes are too far apart.
     """
 
     body: Surface
@@ -74,6 +75,7 @@ class ShadowCurve(DrawnOnBody):
     piece: int = -1
     creases: tuple[int, int] = (-1, -1)
     goes_on: tuple[int, int] = (-1, -1)
+    panels: PanelCurve | None = None
 
     @property
     def direction(self) -> FloatArray:
@@ -94,12 +96,6 @@ class ShadowCurve(DrawnOnBody):
         for start, end, status in self.arcs:
             shares[status] += (end - start) / self.length
         return shares
-
-    @cached_property
-    def panels(self) -> PanelCurve:
-        """The curve in panels that are exact to rounding, fitted when first asked for."""
-        spacing = np.full(len(self.nodes), self.length / len(self.nodes))
-        return fit_panels(self.body, self.wave, self.nodes, spacing)
 
     def line_nodes(self) -> LineNodes:
         """The curve as the nodes of a line of its own."""
@@ -129,7 +125,7 @@ class ShadowCurve(DrawnOnBody):
             raise InvalidInputError(
                 f"arclength of shape {s.shape} is not one finite number or a row of them; give (m,)"
             )
-        if "panels" in vars(self):
+        if self.panels is not None:
             return self.panels.at(s.ravel()).reshape(*s.shape, 3)
         points = interpolated(self.nodes, 0, len(self.nodes), s.ravel() / self.length * len(self.nodes))
         return polished(self.body, self.wave, points)[0].reshape(*s.shape, 3)

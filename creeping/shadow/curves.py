@@ -21,8 +21,8 @@ from creeping.geometry.incident import rows_of
 from creeping.geometry.surface import Surface, size
 from creeping.kernels.threads import in_threads
 
-NEAR = 1e-3
-"""Longest step, in body sizes, that brings an interpolated point onto the line."""
+NEAR = 1e-2
+"""Longest step, in body sizes, that brings an interpolated point onto the line; nodes are much closer."""
 HALF = 6
 """Nodes on either side that a polynomial along a curve goes through."""
 _OFFSETS = np.arange(1 - HALF, HALF + 1)

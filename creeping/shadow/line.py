@@ -26,24 +26,17 @@ from creeping.geometry.checks import unit_of
 from creeping.geometry.evaluators import speed_of
 from creeping.geometry.incident import Incident, PointSource, incident_of, plane_direction, rows_of
 from creeping.geometry.piecewise import is_piecewise
+from creeping.geometry.rows import Rows
 from creeping.geometry.surface import Surface, normal, size
 from creeping.kernels.threads import in_threads
 from creeping.shadow.arcs import Arcs, Finished, finished
 from creeping.shadow.attachment import Arc, LaunchPoints
 from creeping.shadow.curve import ShadowCurve, counted, spelled
 from creeping.shadow.curves import Curves, LineNodes, interpolated, polished
-from creeping.shadow.meshes import (
-    FORBIDDEN,
-    LineMeshes,
-    clearance,
-    critical_distances,
-    judged,
-    prepared,
-    traced,
-)
+from creeping.shadow.meshes import LineMeshes, clearance, critical_distances, judged, prepared, traced
 from creeping.shadow.panels import PanelCurve
 from creeping.shadow.piecewise import EdgePart, launched_from, piecewise_curves
-from creeping.shadow.refinement import followed
+from creeping.shadow.refinement import FORBIDDEN, followed
 from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, OK, SINGULAR, STATUSES
 from creeping.storage.memory import within_budget
 
@@ -237,10 +230,8 @@ def shadow_line(
         else:
             take(np.zeros(1, np.int64), [exact])
     nodes, arcs = lines[-1][0], lines[-1][1].arcs
-    curves = [_curve(body, d, nodes, arcs, k, n_points) for k in range(len(nodes.spacing))]
-    for curve, exact_curve in zip(curves, panels, strict=False):
-        # the nodes of a line that turns this fast are too far apart to go through
-        vars(curve)["panels"] = exact_curve
+    exact_curves = panels or (None,) * len(nodes.spacing)
+    curves = [_curve(body, d, nodes, arcs, k, n_points, of) for k, of in enumerate(exact_curves)]
     return ShadowLine(body, incident, tuple(curves), distance, nodes)
 
 
@@ -286,7 +277,9 @@ def _piecewise_line(body: Surface, source: Incident, n_points: int) -> ShadowLin
     return ShadowLine(body, source, curves, float("inf"), nodes, on_edges, at_tips, edge_on)
 
 
-def _curve(body: Surface, wave: FloatArray, nodes: LineNodes, arcs: Arcs, number: int, n_points: int) -> ShadowCurve:
+def _curve(
+    body: Surface, wave: FloatArray, nodes: LineNodes, arcs: Arcs, number: int, n_points: int, panels: PanelCurve | None
+) -> ShadowCurve:
     first, last = nodes.starts[number : number + 2]
     own = nodes.points[first:last]
     spacing = float(nodes.spacing[number])
@@ -313,6 +306,7 @@ def _curve(body: Surface, wave: FloatArray, nodes: LineNodes, arcs: Arcs, number
         curvature=curvature,
         arcs=tuple((start, end, STATUSES[code]) for (start, end), code in zip(ends.tolist(), codes, strict=True)),
         nodes=own,
+        panels=panels,
     )
 
 
@@ -329,7 +323,7 @@ TOGETHER = 64
 
 
 @dataclass(frozen=True, eq=False)
-class ShadowLines:
+class ShadowLines(Rows):
     """Shadow lines of n incidences.
 
     Attributes
@@ -454,7 +448,7 @@ def lines_together(
         numbers[row], status[row] = (len(line.curves), line.length, line.nodes.error, *shares), OK
         near[row] = line.singular_distance
         launches.append(line.launch_points(n_rays, "all" if every else "attached"))
-    launched = LaunchPoints.together([LaunchPoints.blank(directions[:0], n_rays), *launches])
+    launched = LaunchPoints.joined([LaunchPoints.blank(directions[:0], n_rays), *launches])
     curves, length, error, attached, occluded, concave = numbers.T
     launched = replace(launched, waves=directions)
     return ShadowLines(directions, status, curves, length, error, attached, occluded, concave, near, launched)

@@ -12,7 +12,6 @@ Sources: Derivations, R6, R8 and R11.
 
 from functools import cached_property
 from threading import RLock
-from typing import NamedTuple
 from weakref import ref
 
 import numpy as np
@@ -144,18 +143,9 @@ def singular_segments(body: Surface, mesh: Triangulation) -> FloatArray:
     return np.ascontiguousarray(np.concatenate([n, np.cross(n, a), points.reshape(-1, 2, 3)], axis=-1))
 
 
-FORBIDDEN = 1e-6
-"""v of `critical_distances` below which a line counts as one that crosses itself."""
-
-
 def prepared(body: Surface) -> LineMeshes:
     """Meshes of a body, made once."""
     return memo(body, "line meshes", lambda: LineMeshes(body))
-
-
-def box_of(body: Surface) -> FloatArray:
-    """Bounds as kernels take them: (2, 3), L."""
-    return np.ascontiguousarray(body.bounds, dtype=float)
 
 
 def critical_distances(body: Surface, waves: FloatArray) -> FloatArray:
@@ -213,28 +203,22 @@ def judged(v: FloatArray, certain: BoolArray, turn: float, tier: int) -> tuple[B
     return (onward if tier < LineMeshes.count - 1 else np.zeros_like(onward)), code
 
 
-class Traced(NamedTuple):
-    """Lines of several waves on one mesh: their nodes, None where there is no line, and whether they are certain."""
-
-    nodes: list[LineNodes | None]
-    certain: BoolArray
-
-
-def traced(body: Surface, waves: FloatArray, tier: int) -> Traced:
-    """Nodes of the lines of waves (n, 4) on a mesh."""
-    from creeping.shadow.kernels.trace import CERTAIN, CURVES, ERROR, FOUND, KNOWN, LEAST_NODES, lines_on_mesh
+def traced(body: Surface, waves: FloatArray, tier: int) -> tuple[list[LineNodes | None], BoolArray]:
+    """Nodes of the lines of waves (n, 4) on a mesh, None where there is no line, and whether they are certain (n,)."""
+    from creeping.shadow.kernels.trace import CURVES, LEAST_NODES, lines_on_mesh
 
     mesh, n = prepared(body).packed(tier), len(waves)
     most = mesh[-1] + (LEAST_NODES + 8) * CURVES
     x, T, kappa = np.empty((n, most, 3)), np.empty((n, most, 3)), np.empty((n, most))
-    starts, spacing, known = np.empty((n, CURVES + 1), np.int64), np.empty((n, CURVES)), np.zeros((n, KNOWN))
+    starts, spacing = np.empty((n, CURVES + 1), np.int64), np.empty((n, CURVES))
+    found, certain, error = np.zeros(n, np.int64), np.zeros(n, dtype=bool), np.zeros(n)
     with evaluators(body) as parts:
-        extent = float(np.max(np.ptp(box_of(body), axis=0)))
-        lines_on_mesh(*parts[:2], extent, mesh, waves, x, T, kappa, starts, spacing, known)
+        extent = float(np.max(np.ptp(body.bounds, axis=0)))
+        lines_on_mesh(*parts[:2], extent, mesh, waves, x, T, kappa, starts, spacing, found, certain, error)
     nodes: list[LineNodes | None] = [None] * n
-    for row in np.flatnonzero(known[:, FOUND]):
-        curves = int(known[row, FOUND])
+    for row in np.flatnonzero(found):
+        curves = found[row]
         own = slice(starts[row, curves])
         parts_of = x[row, own], T[row, own], kappa[row, own], starts[row, : curves + 1], spacing[row, :curves]
-        nodes[row] = LineNodes(*parts_of, float(known[row, ERROR]))
-    return Traced(nodes, known[:, CERTAIN] > 0)
+        nodes[row] = LineNodes(*parts_of, float(error[row]))
+    return nodes, certain

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray
+from creeping.geodesics.piece_walk import REACH
 from creeping.geometry.piecewise import Tiles, nearest_crease, piece_ahead, tips_of
 from creeping.geometry.surface import size
 from creeping.shadow.curves import Moved, moved_onto_lines, tangents_at
@@ -23,16 +24,12 @@ STEP, LEAST_STEP = 0.04, 1e-6
 """Longest and shortest step along a curve, in body sizes."""
 TURN = 0.25
 """Largest angle between tangents a step apart, radians."""
-REACH = 1e-3
-"""Distance from a tip, in body sizes, within which nothing is followed: curvatures go like its inverse there."""
 ASTRAY = 1.5
 """Distance from the tiles of a piece, in their longest side, beyond which F = 0 is another sheet, as fits may have."""
 ALIKE = 0.1
 """Distance from a curve, in its steps, up to which a seed lies on it: chords leave it by a third of that."""
 EDGE_ON = 1e-7
 """|n.d| on a whole piece up to which it lies edge-on and has no line of its own."""
-HALVINGS, SHORT = 60, 1e-3
-"""Halvings of the way to where a curve leaves its piece, and the distance, in body sizes, below which two steps do."""
 MOST = 20_000
 """Nodes of a curve at most."""
 CLOSE = 1e-11
@@ -80,20 +77,19 @@ def curves_on(
     if not walk.broken:
         return found, 0.0
     known = sum(float(np.sum(np.linalg.norm(np.diff(curve.nodes, axis=0), axis=1))) for curve in found)
-    return found, max(contour_length(tiles, number, direction) - known, 0.0)
+    ends = contour(tiles, number, direction)
+    return found, max(float(np.sum(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))) - known, 0.0)
 
 
-def contour_length(tiles: Tiles, number: int, direction: FloatArray) -> float:
-    """Length of n.d = 0 on the tiles of a piece, n.d taken as linear on each, L."""
+def contour(tiles: Tiles, number: int, direction: FloatArray) -> FloatArray:
+    """Where n.d = 0, n.d taken as linear on each tile of a piece, crosses their sides: both ends on each (m, 2, 3)."""
     mine = tiles.pieces == number
     corners, s = tiles.corners[mine], tiles.normals[mine] @ direction
     after, ahead = np.roll(corners, -1, axis=1), np.roll(s, -1, axis=1)
     crossed = (s > 0) != (ahead > 0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        points = corners + (s / (s - ahead))[..., None] * (after - corners)
+    share = s[crossed] / (s[crossed] - ahead[crossed])
     # two sides of a triangle are crossed, or none
-    pairs = points[crossed].reshape(-1, 2, 3)
-    return float(np.sum(np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=1)))
+    return np.asarray(corners[crossed] + share[:, None] * (after[crossed] - corners[crossed])).reshape(-1, 2, 3)
 
 
 def edge_on(tiles: Tiles, number: int, direction: FloatArray) -> bool:
@@ -134,14 +130,9 @@ class _Walk:
         """Points of the line on the piece, at least one on each curve that a triangle's side crosses."""
         mine = tiles.pieces == self.number
         corners, s = tiles.corners[mine], tiles.normals[mine] @ self.direction
-        after, ahead = np.roll(corners, -1, axis=1), np.roll(s, -1, axis=1)
-        mixed = (s > 0) != (ahead > 0)
-        share = s[mixed] / (s[mixed] - ahead[mixed])
-        points = corners[mixed] + share[:, None] * (after[mixed] - corners[mixed])
-        points = np.concatenate([points, corners[np.abs(s) < EDGE_ON]])
-        if not len(points):
-            return points
-        edge = float(np.max(np.linalg.norm(after - corners, axis=-1)))
+        crossed = contour(tiles, self.number, self.direction).reshape(-1, 3)
+        points = np.concatenate([crossed, corners[np.abs(s) < EDGE_ON]])
+        edge = self._reach / ASTRAY
         found = self._corrected(points, 0.5 * edge, 12)
         x = found.points[self._solved(found) & (np.linalg.norm(found.points - points, axis=1) < edge)]
         kept: FloatArray = x[self.inside(x) & ~(self._to_tip(x) <= REACH * self.size)]
@@ -222,12 +213,12 @@ class _Walk:
         """Last point of the piece between shares of a chord of the curve."""
         long = float(np.linalg.norm(chord))
         best, other = self._corrected(x + np.array([[low], [high]]) * chord, 0.3 * long).points
-        for _ in range(HALVINGS):
+        for _ in range(60):
             gap = float(np.linalg.norm(other - best))
             if gap <= 1e-14 * self.size:
                 break
             # the middle of two points of the curve is off it by the square of their distance
-            y = self._corrected(0.5 * (best + other)[None], 0.3 * gap, 2 if gap < SHORT * self.size else 6).points
+            y = self._corrected(0.5 * (best + other)[None], 0.3 * gap).points
             if self.inside(y)[0]:
                 best = y[0]
             else:

@@ -20,16 +20,18 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import SingularIncidenceError
+from creeping.geodesics.attenuation import gauss_rule
 from creeping.geometry.piecewise import SMOOTH, pieces_of, tiles_of
 from creeping.geometry.surface import size
 from creeping.shadow.arcs import shared_out
 from creeping.shadow.attachment import Arc, LaunchPoints, occluded
 from creeping.shadow.curve import ShadowCurve
 from creeping.shadow.curves import moved_onto_lines
-from creeping.shadow.panels import PanelCurve, fit_panels
+from creeping.shadow.panels import LENGTH_TOLERANCE, PanelCurve, fit_panels
 from creeping.shadow.piece_curves import EDGE_ON, PieceCurve, curves_on, edge_on
 from creeping.shadow.status import ATTACHED, CONCAVE, NO_RAY, OCCLUDED, STATUSES
 
@@ -39,16 +41,10 @@ LOOKED_AT = 193
 """Points of a curve whose states are asked for."""
 OUTWARD = 1e-9
 """Distance from the body, in its sizes, at which that is asked: along a straight generator F is 0 up to rounding."""
-SHORTEST = 1e-9
-"""Length, in body sizes, of a curve below which there is none."""
 MEET = 1e-7
-"""Distance of the ends of two curves, in body sizes, up to which they meet."""
+"""Distance of the ends of two curves, in body sizes, up to which they meet, and least length of a curve."""
 MOST_PANELS = 1000
 """Of a curve: one that takes more, as along a generator that the wave goes along, is lost, and takes minutes."""
-DOUBLINGS = 5
-"""Of the distance from a tip at which a curve ends, while its panels cannot be made."""
-EXACT = 1e-12
-"""Relative error of a length: panels are exact to rounding."""
 
 
 def piecewise_curves(
@@ -85,7 +81,7 @@ def piecewise_curves(
                 # it turns within rounding of a crossing somewhere: all of it is lost
                 gaps += float(np.sum(np.linalg.norm(np.diff(found.nodes, axis=0), axis=1)))
                 continue
-            if curve.length > SHORTEST * size(body):
+            if curve.length > MEET * size(body):
                 curves.append(curve)
                 gaps += sum(found.gaps)
     curves.sort(key=lambda curve: -curve.length)
@@ -96,7 +92,7 @@ def _as_far_as_known(
     body: Any, piece: Any, number: int, direction: FloatArray, found: PieceCurve, n_points: int
 ) -> tuple[ShadowCurve, PieceCurve]:
     """The curve in panels; where these fail next to a tip, as the slope of F fades into rounding, ended farther off."""
-    for _ in range(DOUBLINGS):
+    for _ in range(5):
         try:
             return _finished(body, piece, number, direction, found, n_points), found
         except SingularIncidenceError:
@@ -136,7 +132,7 @@ def _finished(
         tangents=tangents,
         arclength=arclength,
         length=panels.length,
-        error=EXACT,
+        error=LENGTH_TOLERANCE,
         status=np.full(n_points, STATUSES[ATTACHED]),
         curvature=curvature,
         arcs=arcs,
@@ -144,8 +140,8 @@ def _finished(
         closed=found.closed,
         piece=number,
         creases=found.creases,
+        panels=panels,
     )
-    vars(curve)["panels"] = panels
     curve.status[:] = np.array(STATUSES)[curve.state_at(arclength)]
     return curve
 
@@ -205,9 +201,7 @@ def _joined(body: Any, curves: list[ShadowCurve]) -> tuple[ShadowCurve, ...]:
         if curve.closed:
             out.append(curve)
             continue
-        one = replace(curve, goes_on=(goes_on[number, 0], goes_on[number, 1]))
-        vars(one)["panels"] = curve.panels
-        out.append(one)
+        out.append(replace(curve, goes_on=(goes_on[number, 0], goes_on[number, 1])))
     return tuple(out)
 
 
@@ -236,8 +230,6 @@ def launched_from(curves: tuple[ShadowCurve, ...], arcs: list[Arc], direction: F
 
 PROBE = 1e-4
 """Distance from an edge, in body sizes, at which F tells a convex one from a concave one."""
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
-_GAUSS, _WEIGHTS = 0.5 * (_NODES + 1), 0.5 * _WEIGHTS
 
 
 class EdgePart(NamedTuple):
@@ -335,13 +327,7 @@ def _meet(before: tuple[FloatArray, float], after: tuple[FloatArray, float]) -> 
 
 def _cut(x: FloatArray, e: FloatArray, side: Any, direction: FloatArray) -> float:
     """Share of a segment at which n.d of one side changes its sign."""
-    low, high = 0.0, 1.0
-    dark = unit_normals(side, x[:1])[0] @ direction >= -EDGE_ON
-    for _ in range(45):
-        middle = 0.5 * (low + high)
-        same = (unit_normals(side, _cubic(x, e, np.array([middle])))[0] @ direction >= -EDGE_ON) == dark
-        low, high = (middle, high) if same else (low, middle)
-    return 0.5 * (low + high)
+    return float(brentq(lambda u: unit_normals(side, _cubic(x, e, np.array([u])))[0] @ direction + EDGE_ON, 0.0, 1.0))
 
 
 def _cubic(x: FloatArray, e: FloatArray, u: FloatArray) -> FloatArray:
@@ -353,7 +339,8 @@ def _cubic(x: FloatArray, e: FloatArray, u: FloatArray) -> FloatArray:
 
 def _length(x: FloatArray, e: FloatArray, low: float, high: float) -> float:
     """Length of the cubic from a share to another, L."""
-    u = (low + (high - low) * _GAUSS)[:, None]
+    points, weights = gauss_rule(5)
+    u = (low + (high - low) * points)[:, None]
     chord, h = x[1] - x[0], float(np.linalg.norm(x[1] - x[0]))
     slope = 6 * u * (1 - u) * chord + h * ((1 - u) * (1 - 3 * u) * e[0] + u * (3 * u - 2) * e[1])
-    return float((high - low) * np.sum(_WEIGHTS * np.linalg.norm(slope, axis=1)))
+    return float((high - low) * np.sum(weights * np.linalg.norm(slope, axis=1)))

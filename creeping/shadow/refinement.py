@@ -35,7 +35,7 @@ from creeping.geometry.triangulation import Triangulation
 from creeping.shadow.curves import LineNodes, moved_onto_lines
 from creeping.shadow.panels import PanelCurve, fit_panels
 
-SINGULAR = 1e-6
+FORBIDDEN = 1e-6
 """|n.q|/|q| at a critical point below which the incidence is refused."""
 MAX_SEEDS = 160
 
@@ -61,8 +61,8 @@ class CriticalPoints:
 
     def refuse(self) -> None:
         """Raise SingularIncidenceError if the shadow line runs through a critical point."""
-        if self.distance < SINGULAR:
-            crossing = np.abs(self.values) < SINGULAR
+        if self.distance < FORBIDDEN:
+            crossing = np.abs(self.values) < FORBIDDEN
             raise self.error("crosses itself", self.points[crossing])
 
     def error(self, trouble: str, points: FloatArray) -> SingularIncidenceError:

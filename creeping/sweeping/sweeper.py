@@ -125,7 +125,7 @@ class Sweeper:
             return None
         request, directions = self.request, lines.directions[rows]
         for name, found in zip(
-            VALID, validities(self.body, lines.launch.of(rows), self._early, request.wavenumbers), strict=True
+            VALID, validities(self.body, lines.launch[rows], self._early, request.wavenumbers), strict=True
         ):
             out[name][rows] = found
         bistatic = request.quantity == "bistatic"
@@ -144,7 +144,7 @@ class Sweeper:
                 fans[number] = self._fan(directions[number])
             return fans[number]
 
-        geometry = FarGeometry(self.flow, lines.launch.of(rows), tracer, observers, lines.attached[rows], forward)
+        geometry = FarGeometry(self.flow, lines.launch[rows], tracer, observers, lines.attached[rows], forward)
         made: dict[tuple[int, int], Parts] = {}
         # boundaries of one frequency follow each other: they share what is of the frequency alone
         for k, wavenumber in enumerate(request.wavenumbers):
