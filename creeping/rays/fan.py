@@ -38,7 +38,7 @@ from creeping.rays.ends import FEW_RAYS, Losses, Starts, ends_of, outline_share
 from creeping.rays.reach import AUTO, HARD_DECAY, IN_RANGE, ray_length
 from creeping.rays.status import AT_CREASES, LAUNCHED, LINE_STATUS, RayStatus
 from creeping.rays.transport import Flow, carried, checked_flow, spread, zeros_passed
-from creeping.shadow.attachment import LaunchPoints, line_tangents, parting_positions
+from creeping.shadow.attachment import LaunchPoints, line_tangents
 from creeping.shadow.line import ShadowLine, checked_launch_from
 from creeping.shadow.status import NO_RAY
 from creeping.storage.memory import within_budget
@@ -271,9 +271,7 @@ def launch(
     states = _carry(flow, line, starts, times)
     most, passes = min(MAX_RAYS, max(GROWTH * len(starts.arc), FEW_RAYS)), HALVED if has_edges(body) else MAX_RAYS
     for _ in range(0 if np.isinf(gap) else passes):
-        arc, position = parting_positions(
-            states[..., X], starts.arcs, starts.arc, starts.position, gap, known_steps(states, times)
-        )
+        arc, position = starts.parting(states[..., X], gap, known_steps(states, times))
         if not len(arc) or len(starts.arc) + len(arc) > most:
             break
         more = Starts.at(line, starts.arcs, arc, position)

@@ -256,19 +256,19 @@ def _assembled(
     facing = np.sum(arriving * normals[second], axis=1, keepdims=True)
     arriving = arriving - facing * normals[second]
     arriving /= np.linalg.norm(arriving, axis=1, keepdims=True)
-    J2, rate = known[:, lane.SPREADING], known[:, lane.RATE]
+    J2, rate = known[:, lane.LANE.J2], known[:, lane.LANE.rate]
     principal = np.arctan2(J2, size(body) * rate)
     # J2 > 0 for angles from 0 to pi: whole half turns beyond are zeros
     principal = np.where(principal < 0, principal + np.pi, principal)
-    caustics = np.maximum(np.rint((known[:, lane.ANGLE] - principal) / np.pi), 0).astype(np.int64)
+    caustics = np.maximum(np.rint((known[:, lane.LANE.angle] - principal) / np.pi), 0).astype(np.int64)
 
     def ends(of: int) -> FloatArray:
-        return np.stack([start[:, of - lane.CURVATURE], known[:, of]], axis=1)
+        return np.stack([start[:, of - lane.LANE.kappa], known[:, of]], axis=1)
 
     # of the Jacobi field that is 1 at the first end and 0 at the second
     with np.errstate(divide="ignore", invalid="ignore"):
-        aside = known[:, lane.TURNING] / J2
-        turning = np.stack([known[:, lane.MOVING] - known[:, lane.BACK] * aside, aside], axis=1)
+        aside = known[:, lane.LANE.turning] / J2
+        turning = np.stack([known[:, lane.LANE.moving] - known[:, lane.LANE.M11] * aside, aside], axis=1)
     return PortRays(
         body=body,
         ports=ports,
@@ -280,12 +280,12 @@ def _assembled(
         points=ports[np.stack([first, second], axis=1)],
         directions=np.stack([leaving, arriving], axis=1),
         spreading=J2,
-        rates=np.stack([known[:, lane.BACK], rate], axis=1),
+        rates=np.stack([known[:, lane.LANE.M11], rate], axis=1),
         caustics=caustics,
-        curvature=ends(lane.CURVATURE),
-        torsion=ends(lane.TORSION),
-        bend=ends(lane.BEND),
-        integrals=known[:, lane.INTEGRALS : lane.INTEGRALS + lane.PARTS],
+        curvature=ends(lane.LANE.kappa),
+        torsion=ends(lane.LANE.T),
+        bend=ends(lane.LANE.B),
+        integrals=known[:, lane.LANE.integrals : lane.LANE.integrals + lane.PARTS],
         turning=turning,
         error=start[:, lane.START],
         folds=folds[0],

@@ -1,4 +1,4 @@
-"""Attachment points: where creeping rays are launched from the shadow line, and new ones where rays part.
+"""Attachment points: where creeping rays are launched from the shadow line.
 
 A position is (arc, arclength) with the arclength unwrapped, so that it grows along an arc that crosses the start of its
 closed curve; the point is that of the arclength modulo the curve's length.
@@ -123,43 +123,6 @@ def evenly_chosen(there: BoolArray, most: int) -> BoolArray:
     every = np.maximum(there.sum(axis=1, keepdims=True) / most, 1.0)
     number = np.cumsum(there, axis=1) - 1
     return np.asarray(there & ((np.floor(number / every) > np.floor((number - 1) / every)) | (number == 0)))
-
-
-def parting_positions(
-    points: FloatArray,
-    arcs: list[Arc],
-    arc: IntArray,
-    arclength: FloatArray,
-    gap: float,
-    known: IntArray | None = None,
-) -> tuple[IntArray, FloatArray]:
-    """Positions half-way between neighbours that come to part by more than ``gap``: (m,), (m,).
-
-    ``points`` (rays, steps, 3) are in the order of the positions: by arc, then by arclength. ``known`` (rays,) are the
-    steps before each ray ends; what comes after says nothing.
-    """
-    new_arc, new_arclength = [], []
-    for k, one in enumerate(arcs):
-        mine = np.flatnonzero(arc == k)
-        if len(mine) < 2:
-            continue
-        following = np.roll(mine, -1)
-        after = arclength[following].copy()
-        after[-1] += one.end - one.start
-        if not one.closed:
-            mine, following, after = mine[:-1], following[:-1], after[:-1]
-        distance = np.linalg.norm(points[following] - points[mine], axis=-1)
-        if known is not None:
-            common = np.minimum(known[following], known[mine])
-            distance[np.arange(distance.shape[1]) >= common[:, None]] = 0.0
-        apart = np.max(distance, axis=-1)
-        # below a spacing of rounding size more rays would tell nothing
-        wide = (apart > gap) & (after - arclength[mine] > 1e-9 * (one.end - one.start))
-        new_arc.append(np.full(int(wide.sum()), k, dtype=np.int64))
-        new_arclength.append(0.5 * (arclength[mine] + after)[wide])
-    if not new_arc:
-        return np.zeros(0, dtype=np.int64), np.zeros(0)
-    return np.concatenate(new_arc), np.concatenate(new_arclength)
 
 
 def line_tangents(body: Surface, points: FloatArray, direction: FloatArray) -> FloatArray:

@@ -6,6 +6,7 @@ Sources: Derivations, R6.
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,15 +98,6 @@ class ShadowCurve(DrawnOnBody):
             shares[status] += (end - start) / self.length
         return shares
 
-    def line_nodes(self) -> LineNodes:
-        """The curve as the nodes of a line of its own."""
-        if self.piece >= 0:
-            x, tangents, curvature = self.nodes, self.tangents, self.curvature
-        else:
-            x, tangents, curvature = polished(self.body, self.wave, self.nodes)
-        spacing = np.array([self.length / len(x)])
-        return LineNodes(x, tangents, curvature, np.array([0, len(x)]), spacing, self.error)
-
     def state_at(self, arclength: FloatArray) -> IntArray:
         """Codes of the status at arclengths modulo the length, of an open curve no further than its ends: (m,)."""
         # rounding may leave a place between two arcs: then it is of neither side, and concave launches nothing
@@ -138,6 +130,19 @@ class ShadowCurve(DrawnOnBody):
             f"  |n.d| at most {np.max(np.abs(self.grazing)):.1e}; "
             f"kappa_n(d) from {np.min(self.curvature):.3g} to {np.max(self.curvature):.3g} 1/{unit}"
         )
+
+
+def nodes_of(curves: Sequence[ShadowCurve]) -> LineNodes:
+    """Curves as the nodes of a line of their own."""
+    found = [(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))]
+    for curve in curves:
+        x = curve.nodes
+        there = (x, curve.tangents, curve.curvature) if curve.piece >= 0 else polished(curve.body, curve.wave, x)
+        found.append(there)
+    points, tangents, curvature = (np.concatenate(of) for of in zip(*found, strict=True))
+    starts = np.cumsum([len(of[0]) for of in found], dtype=np.int64)
+    spacing = np.array([curve.length / len(curve.nodes) for curve in curves], dtype=float)
+    return LineNodes(points, tangents, curvature, starts, spacing, max((curve.error for curve in curves), default=0.0))
 
 
 def spelled(fractions: dict[str, float]) -> str:

@@ -31,7 +31,7 @@ from creeping.geometry.surface import Surface, normal, size
 from creeping.kernels.threads import in_threads
 from creeping.shadow.arcs import Arcs, Finished, finished
 from creeping.shadow.attachment import Arc, LaunchPoints
-from creeping.shadow.curve import ShadowCurve, counted, spelled
+from creeping.shadow.curve import ShadowCurve, counted, nodes_of, spelled
 from creeping.shadow.curves import Curves, LineNodes, interpolated, polished
 from creeping.shadow.meshes import LineMeshes, clearance, critical_distances, judged, prepared, traced
 from creeping.shadow.panels import PanelCurve
@@ -265,16 +265,7 @@ def _piecewise_line(body: Surface, source: Incident, n_points: int) -> ShadowLin
     if speed_of(body) is not None:
         raise InvalidInputError(f"{brief(body)} has creases and a speed; give a body with one or the other")
     curves, on_edges, at_tips, edge_on = piecewise_curves(body, direction, n_points)
-    parts = [curve.line_nodes() for curve in curves]
-    nodes = LineNodes(
-        points=np.concatenate([np.zeros((0, 3)), *(part.points for part in parts)]),
-        tangents=np.concatenate([np.zeros((0, 3)), *(part.tangents for part in parts)]),
-        curvature=np.concatenate([np.zeros(0), *(part.curvature for part in parts)]),
-        starts=np.cumsum([0, *(len(part.curvature) for part in parts)]).astype(np.int64),
-        spacing=np.concatenate([np.zeros(0), *(part.spacing for part in parts)]),
-        error=max((part.error for part in parts), default=0.0),
-    )
-    return ShadowLine(body, source, curves, float("inf"), nodes, on_edges, at_tips, edge_on)
+    return ShadowLine(body, source, curves, float("inf"), nodes_of(curves), on_edges, at_tips, edge_on)
 
 
 def _curve(

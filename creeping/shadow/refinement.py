@@ -65,8 +65,10 @@ class CriticalPoints:
             crossing = np.abs(self.values) < FORBIDDEN
             raise self.error("crosses itself", self.points[crossing])
 
-    def error(self, trouble: str, points: FloatArray) -> SingularIncidenceError:
-        """Error for the given points (k, 3), with the remedy."""
+    def error(self, trouble: str, points: FloatArray | None = None) -> SingularIncidenceError:
+        """Error for the given points (k, 3), or the critical one nearest to the line, with the remedy."""
+        if points is None:
+            points = self.points[np.argsort(np.abs(self.values))[:1]]
         named = ", ".join(str(tuple((np.round(p, 6) + 0.0).tolist())) for p in points[:8])
         more = f" and {len(points) - 8} more" if len(points) > 8 else ""
         return SingularIncidenceError(
@@ -206,8 +208,8 @@ def _curves(body: Surface, wave: FloatArray, mesh: Triangulation, critical: Crit
     h_finer = np.concatenate([h, _values(body, wave, finer.vertices[len(h) :])])
     again = _loops(_edges(finer.triangles)[1], h_finer[finer.triangles] >= 0)
     if len(again) != len(loops):
-        raise _unsettled(
-            critical, f"has {len(loops)} curves on one mesh and {len(again)} on the next; it nearly crosses itself"
+        raise critical.error(
+            f"has {len(loops)} curves on one mesh and {len(again)} on the next; it nearly crosses itself"
         )
     return [_curve(body, wave, mesh, edges[loop]) for loop in loops]
 
@@ -215,12 +217,6 @@ def _curves(body: Surface, wave: FloatArray, mesh: Triangulation, critical: Crit
 def _values(body: Surface, wave: FloatArray, points: FloatArray) -> FloatArray:
     gradient = body.gradient(points)
     return np.asarray(np.sum(gradient * travel(wave, points), axis=-1) / np.linalg.norm(gradient, axis=-1))
-
-
-def _unsettled(critical: CriticalPoints, trouble: str, points: FloatArray | None = None) -> Exception:
-    if points is None:
-        points = critical.points[np.argsort(np.abs(critical.values))[:1]]
-    return critical.error(trouble, points)
 
 
 def _resolve(
@@ -239,7 +235,7 @@ def _resolve(
         new_h, new_g = incidence(body, wave, mesh.vertices[len(h) :])
         h, g = np.concatenate([h, new_h]), np.concatenate([g, new_g])
     corner = mesh.vertices[mesh.triangles[np.flatnonzero(_unsafe(body, mesh, h, g))[:1], 0]]
-    raise _unsettled(critical, "nearly crosses itself, closer than the finest mesh can tell,", corner)
+    raise critical.error("nearly crosses itself, closer than the finest mesh can tell,", corner)
 
 
 def _unsafe(body: Surface, mesh: Triangulation, h: FloatArray, g: FloatArray) -> BoolArray:
@@ -265,7 +261,7 @@ def _check_signs(critical: CriticalPoints, mesh: Triangulation, h: FloatArray) -
     _, nearest = cKDTree(mesh.vertices).query(critical.points[near])
     wrong = (h[nearest] >= 0) != (critical.values[near] >= 0)
     if wrong.any():
-        raise _unsettled(critical, "nearly crosses itself", critical.points[near][wrong])
+        raise critical.error("nearly crosses itself", critical.points[near][wrong])
 
 
 def _edges(triangles: IntArray) -> tuple[IntArray, IntArray]:

@@ -17,6 +17,7 @@ Sources: [C76]; Derivations, R1 and F25.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -30,9 +31,29 @@ BEHIND, AHEAD = 2, 3
 """Nodes that polynomials take before and behind an interval."""
 GUARD = 7
 """Steps traced beyond the last interval: three for its polynomial, one for each integral, two for derivatives."""
-SPREADING, RATE, BACK, ANGLE, CURVATURE, TORSION, BEND, INTEGRALS, ACROSS = 6, 7, 8, 9, 10, 11, 12, 13, 18
-TURNING, MOVING = 19, 20
-"""Lanes: x and p, J2, its rate M22, M11, the angle phi of (J2, J2'), kappa, T, B, integrals, kappa_t, A_theta, A_0."""
+
+
+class Lanes(NamedTuple):
+    """Where in a lane what is: x and p come first, and the integrals take PARTS."""
+
+    J2: int = 6
+    rate: int = 7
+    M11: int = 8
+    angle: int = 9
+    """Phi of (J2, J2')."""
+    kappa: int = 10
+    T: int = 11
+    B: int = 12
+    integrals: int = 13
+    across: int = 18
+    """kappa_t."""
+    turning: int = 19
+    """A_theta."""
+    moving: int = 20
+    """A_0."""
+
+
+LANE = Lanes()
 LANES, PARTS = 21, 5
 """Their number, and that of the integrals."""
 START = 3
@@ -65,7 +86,7 @@ def port_fan(level, level_par, step, scale, squares, states, lanes, last):
     kappa, across, torsion = np.empty((rays, J)), np.empty((rays, J)), np.empty((rays, J))
     for ray in range(rays):
         curvatures_along(level, level_par, states[ray], x, g, kappa[ray], across[ray], torsion[ray], normals)
-    rates = np.empty((7, J))
+    rates = np.empty((8, J))
     leaning, moving = np.empty(J), np.empty(J)
     for ray in range(rays):
         opposite = (ray + half) % rays
@@ -87,21 +108,21 @@ def port_fan(level, level_par, step, scale, squares, states, lanes, last):
             to = line[BEHIND + k]
             for axis in range(6):
                 to[axis] = states[ray, k, axis]
-            to[SPREADING], to[RATE], to[BACK] = states[ray, k, 8], states[ray, k, 9], states[ray, k, 6]
-            turned = math.atan2(to[SPREADING], scale * to[RATE])
-            before = line[BEHIND + k - 1, ANGLE] if k > 0 else 0.0
-            to[ANGLE] = turned + 2 * math.pi * math.floor((before - turned) / (2 * math.pi) + 0.5)
-            to[CURVATURE], to[TORSION], to[BEND], to[ACROSS] = (
+            to[LANE.J2], to[LANE.rate], to[LANE.M11] = states[ray, k, 8], states[ray, k, 9], states[ray, k, 6]
+            turned = math.atan2(to[LANE.J2], scale * to[LANE.rate])
+            before = line[BEHIND + k - 1, LANE.angle] if k > 0 else 0.0
+            to[LANE.angle] = turned + 2 * math.pi * math.floor((before - turned) / (2 * math.pi) + 0.5)
+            to[LANE.kappa], to[LANE.T], to[LANE.B], to[LANE.across] = (
                 kappa[ray, k],
                 torsion[ray, k],
                 rates[3, k],
                 across[ray, k],
             )
-            to[TURNING], to[MOVING] = leaning[k], moving[k]
+            to[LANE.turning], to[LANE.moving] = leaning[k], moving[k]
             for q in range(PARTS):
-                row = (0, 1, 2, 4, 5)[q]
-                so_far = line[BEHIND + k - 1, INTEGRALS + q] if k > 0 else 0.0
-                to[INTEGRALS + q] = so_far + (_stretch(rates, row, k - 1, step, k > 1) if k > 0 else 0.0)
+                row = (0, 1, 2, 7, 5)[q]
+                so_far = line[BEHIND + k - 1, LANE.integrals + q] if k > 0 else 0.0
+                to[LANE.integrals + q] = so_far + (_stretch(rates, row, k - 1, step, k > 1) if k > 0 else 0.0)
     for ray in range(rays):
         opposite = lanes[(ray + half) % rays]
         for k in range(1, BEHIND + 1):
@@ -109,21 +130,21 @@ def port_fan(level, level_par, step, scale, squares, states, lanes, last):
             copy(source, to)
             for lane in range(3, 6):
                 to[lane] = -source[lane]
-            to[SPREADING], to[ANGLE], to[TURNING] = -source[SPREADING], -source[ANGLE], -source[TURNING]
+            to[LANE.J2], to[LANE.angle], to[LANE.turning] = -source[LANE.J2], -source[LANE.angle], -source[LANE.turning]
             for q in range(PARTS):
-                to[INTEGRALS + q] = -source[INTEGRALS + q]
+                to[LANE.integrals + q] = -source[LANE.integrals + q]
 
 
 @njit(**options)
 def _rates(kappa, kappa_back, across, torsion, torsion_back, states, step, k, rates):
-    """Integrands at node k: of A, of both exponents without g, B, of A_theta in row 4, of the last one, and of A_0."""
+    """At node k the integrands of A, of both exponents without g, B, and those of A_theta, K, A_0 and the spreading."""
     before, behind = kappa[k - 1] if k > 0 else kappa_back[1], kappa[k - 2] if k > 1 else kappa_back[2 - k]
     slope = (8 * (kappa[k + 1] - before) - (kappa[k + 2] - behind)) / (12 * step)
     bend = (16 * (kappa[k + 1] + before) - 30 * kappa[k] - kappa[k + 2] - behind) / (12 * step * step)
     before, behind = torsion[k - 1] if k > 0 else torsion_back[1], torsion[k - 2] if k > 1 else torsion_back[2 - k]
     twist = (8 * (torsion[k + 1] - before) - (torsion[k + 2] - behind)) / (12 * step)
     if not kappa[k] > 0.0:
-        for row in range(7):
+        for row in range(8):
             rates[row, k] = 0.0
         return
     rho = 1.0 / kappa[k]
@@ -139,24 +160,18 @@ def _rates(kappa, kappa_back, across, torsion, torsion_back, states, step, k, ra
     rates[5, k] = (kappa[k] * across[k] - torsion[k] ** 2) / (root * root)
     rates[4, k] = 2 / 3 / root * (states[k, 8] * twist + 2 * states[k, 9] * torsion[k])
     rates[6, k] = 2 / 3 / root * (states[k, 6] * twist + 2 * states[k, 7] * torsion[k])
+    rates[7, k] = root * root * (across[k] * rho / 3 - 1 / 12 - 5 / 18 * t)
 
 
 @njit(**options)
 def _add_torsion(kappa, torsion, leaning, spreading, squares, k, rates):
-    """Complete the first exponent's integrand by g, and put that of the spreading's change into row 4."""
-    if not kappa > 0.0:
-        rates[4, k] = 0.0
-        return
-    root, rho = kappa ** (1 / 3), 1.0 / kappa
-    g = 4 / 3 * torsion
-    if k > 0 and spreading != 0.0:
-        g = root * leaning / spreading
-    g = min(max(g, -TURNED * kappa), TURNED * kappa)
-    rates[1, k] -= root**4 * rho * rho * (0.25 * squares * g * g - 2 / 3 * g * torsion + 0.4 * torsion * torsion)
-    t = (torsion * rho) ** 2
-    # r from the second exponent's integrand
-    r = 4 * (rates[2, k] / root**4 - 0.1 + rates[3, k] / 60 + 0.15 * t)
-    rates[4, k] = root * root * (r / 3 - 1 / 12 - 5 / 18 * t)
+    """Complete the first exponent's integrand by g."""
+    if kappa > 0.0:
+        root, g = kappa ** (1 / 3), 4 / 3 * torsion
+        if k > 0 and spreading != 0.0:
+            g = root * leaning / spreading
+        g = min(max(g, -TURNED * kappa), TURNED * kappa)
+        rates[1, k] -= (0.25 * squares * g * g - 2 / 3 * g * torsion + 0.4 * torsion * torsion) * root**4 / kappa**2
 
 
 @njit(**options)
@@ -251,8 +266,8 @@ def passed(lanes, last, matrices, ports, order, along, after, pad, folds, owner,
             for corner in range(4):
                 at = (one[k], one[k + 1], two[k], two[k + 1])[corner]
                 radius = max(radius, math.sqrt(_square(at, middle)))
-            least = min(min(one[k, SPREADING], one[k + 1, SPREADING]), min(two[k, SPREADING], two[k + 1, SPREADING]))
-            most_ = max(max(one[k, SPREADING], one[k + 1, SPREADING]), max(two[k, SPREADING], two[k + 1, SPREADING]))
+            least = min(min(one[k, LANE.J2], one[k + 1, LANE.J2]), min(two[k, LANE.J2], two[k + 1, LANE.J2]))
+            most_ = max(max(one[k, LANE.J2], one[k + 1, LANE.J2]), max(two[k, LANE.J2], two[k + 1, LANE.J2]))
             dead = k + 1 - BEHIND > min(last[m], last[(m + 1) % rays])
             folded = least < 0.0 < most_ and k > BEHIND and not dead
             reach = PAD * radius
@@ -266,7 +281,7 @@ def passed(lanes, last, matrices, ports, order, along, after, pad, folds, owner,
                     continue
                 if dead or folded:
                     row = 1 if dead else 0
-                    folds[row, j] = min(folds[row, j], one[k, INTEGRALS])
+                    folds[row, j] = min(folds[row, j], one[k, LANE.integrals])
                 if dead or square > reach * reach:
                     continue
                 # two rays may pass a port in a cell in which neighbours cross: from all its corners
@@ -299,7 +314,7 @@ def _read(lanes, matrices, m, k, place, w, out):
     _sum(lanes, m, k, w[0, 0], w[1, 0], 0, LANES, out)
     # at the port itself
     w[1, 1, 1:], w[1, 1, 0] = 0.0, 1.0
-    _sum(lanes, m, BEHIND, w[0, 0], w[1, 1, :1], CURVATURE, START, out[LANES:])
+    _sum(lanes, m, BEHIND, w[0, 0], w[1, 1, :1], LANE.kappa, START, out[LANES:])
     coarse = np.zeros(3)
     for axis in range(2):
         polynomial_weights(matrices[1], place[axis], 1.0, w[axis])
