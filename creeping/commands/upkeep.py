@@ -231,7 +231,7 @@ def steps(first: str) -> list[Callable[[], object]]:
     import creeping as cr
     import scatterers as sc
     from creeping.geodesics.states import pack
-    from creeping.shadow.many import shadow_lines
+    from creeping.shadow.line import shadow_lines
 
     body = sc.Sphere()
     directions = cr.fibonacci_directions(2)

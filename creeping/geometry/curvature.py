@@ -147,24 +147,22 @@ def _found(body: Surface, mesh: Triangulation) -> ParabolicPoints:
     K = gaussian_curvature(body, mesh.vertices)
     edges = mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     edges = edges[(edges[:, 0] < edges[:, 1]) & ((K[edges[:, 0]] > 0) != (K[edges[:, 1]] > 0))]
-    points = _crossings(body, mesh.vertices[edges[:, 0]], mesh.vertices[edges[:, 1]], K[edges[:, 0]], K[edges[:, 1]])
-    n = normal(body, points)
-    flat = np.eye(3) - n[:, :, None] * n[:, None, :]
-    shape = flat @ body.hessian(points) @ flat / np.linalg.norm(body.gradient(points), axis=1)[:, None, None]
-    # of the three eigenvalues that of n is 0, and one of the others nearly
-    curvatures, vectors = np.linalg.eigh(shape)
-    across = np.take_along_axis(curvatures, np.argmax(np.abs(curvatures), axis=1)[:, None], axis=1)[:, 0]
-    t = np.take_along_axis(vectors, np.argmax(np.abs(curvatures), axis=1)[:, None, None], axis=2)[:, :, 0]
-    u = np.cross(n, t)
-    u /= np.maximum(np.linalg.norm(u, axis=1, keepdims=True), 1e-300)
+    points, n, u, across = parabolic_crossings(
+        body, mesh.vertices[edges[:, 0]], mesh.vertices[edges[:, 1]], K[edges[:, 0]], K[edges[:, 1]]
+    )
     step = STEP * size(body)
     ahead, behind = (gaussian_curvature(body, project(body, points + sign * step * u)) for sign in (1, -1))
     bend = (ahead - behind) / (2 * step) / across
     return ParabolicPoints(points, n, u * np.sign(bend)[:, None], np.abs(bend), across)
 
 
-def _crossings(body: Surface, a: FloatArray, b: FloatArray, Ka: FloatArray, Kb: FloatArray) -> FloatArray:
-    """Points of K = 0 between points of both signs (n, 3), L, by false position that halves the stale end."""
+def parabolic_crossings(
+    body: Surface, a: FloatArray, b: FloatArray, Ka: FloatArray, Kb: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Points of K = 0 between points of both signs (n, 3), L, by false position that halves the stale end.
+
+    With n (n, 3), the unit tangent of zero normal curvature (n, 3), and the other principal curvature (n,), 1/L.
+    """
     x = a
     for _ in range(SECANTS):
         share = (Ka / (Ka - Kb))[:, None]
@@ -173,4 +171,12 @@ def _crossings(body: Surface, a: FloatArray, b: FloatArray, Ka: FloatArray, Kb: 
         same = (K > 0) == (Ka > 0)
         a, Kb = np.where(same[:, None], x, a), np.where(same, 0.5 * Kb, K)
         b, Ka = np.where(same[:, None], b, x), np.where(same, K, 0.5 * Ka)
-    return x
+    n = normal(body, x)
+    flat = np.eye(3) - n[:, :, None] * n[:, None, :]
+    shape = flat @ body.hessian(x) @ flat / np.linalg.norm(body.gradient(x), axis=1)[:, None, None]
+    # of the three eigenvalues that of n is 0, and one of the others nearly
+    curvatures, vectors = np.linalg.eigh(shape)
+    largest = np.argmax(np.abs(curvatures), axis=1)[:, None]
+    across = np.take_along_axis(curvatures, largest, axis=1)[:, 0]
+    u = np.cross(n, np.take_along_axis(vectors, largest[..., None], axis=2)[:, :, 0])
+    return x, n, u / np.maximum(np.linalg.norm(u, axis=1, keepdims=True), 1e-300), across

@@ -16,12 +16,13 @@ corner and half of both sides there.
 Sources: Derivations, B14; [BT04].
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
+from creeping.geometry.rows import Rows
 
 DEGREE = 6
 """Degree of the polynomials along u and v."""
@@ -39,7 +40,7 @@ LEAN = 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class Patches:
+class Patches(Rows):
     """Squares that cover a body.
 
     Attributes
@@ -71,10 +72,6 @@ class Patches:
     tips: BoolArray
     off: FloatArray
 
-    def __getitem__(self, at: Any) -> "Patches":
-        """Some of the squares."""
-        return Patches(*(getattr(self, one.name)[at] for one in fields(self)))
-
     @property
     def gap(self) -> float:
         """Integral of the normal as a share of the area: 0 where the squares close."""
@@ -95,11 +92,6 @@ class Patches:
             sine /= np.linalg.norm(along, axis=-1) * np.linalg.norm(across, axis=-1)
         sine[self.pointed, 0] = 1.0
         return float(np.min(sine))
-
-    @staticmethod
-    def joined(parts: list["Patches"]) -> "Patches":
-        """Squares of several."""
-        return Patches(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Patches)))
 
 
 @lru_cache

@@ -21,14 +21,14 @@ from creeping.plotting._strokes import LevelColours, RayLook, RayOptions
 from creeping.plotting.pictures import TITLE_SIZE, add_legends, draw, drawn_page
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve, split_at_seam
-from creeping.shadow.curve import ShadowCurve
+from creeping.shadow.curve import ShadowCurve, nodes_of
 from creeping.shadow.line import ShadowLine
 from creeping.shadow.status import STATUSES
 
 
 def line_of(curve: ShadowCurve) -> ShadowLine:
     """Shadow line that consists of one curve, for pictures: how far it is from crossing itself is not known."""
-    return ShadowLine(curve.body, incident_of_row(curve.wave), (curve,), np.nan, curve.line_nodes())
+    return ShadowLine(curve.body, incident_of_row(curve.wave), (curve,), np.nan, nodes_of([curve]))
 
 
 def plot_line(

@@ -29,12 +29,11 @@ ALIKE = (1e-2, 1e-1)
 ROUNDS = 10
 FAR, FAR_ON_PIECES = 3.0, 1.5
 """Cells by which a search may move before it is given up, as most of those on bodies with creases are."""
-SLOW, IDLE, IDLE_ON_PIECES = 0.95, 5, 1
-"""And rounds in a row that do not bring the residual down to this share, where most go nowhere."""
-CROWDED, STEP, STEP_ON_PIECES, LEAST_CELL = 500, 8.0, 2.0, 0.008
-"""Searches of one direction that are so many that a fan folds finely: IDLE ends some there, and the first step of
-Newton's method, in cells, from which on nothing is a cell away. On bodies with creases always, and cells of dense fans
-count as cells of so many body sizes: what is near does not hang on the number of rays."""
+STEP, STEP_ON_PIECES = 8.0, 2.0
+"""First step of Newton's method, in cells, from which on nothing is a cell away."""
+SLOW, LEAST_CELL = 0.95, 0.008
+"""On bodies with creases, the residual's share to which each round has to bring it down, and the body sizes as cells of
+which those of dense fans count: what is near does not hang on the number of rays."""
 NEARLY = 2e-4
 """Residual from which a step is taken to end the search, which converges by squares; what it finds is looked at."""
 MORE, HOPE = 3, 0.25
@@ -48,7 +47,6 @@ def rays_towards(
     near: FloatArray,
     times: FloatArray,
     cell: FloatArray,
-    together: IntArray | None = None,
 ) -> tuple[SingleRays, IntArray, FloatArray]:
     """Rays with p = r next to given points and times.
 
@@ -60,8 +58,6 @@ def rays_towards(
     times : (n,)
     cell : (n, 2), L
         Distances of neighbouring rays and samples: a search that leaves its neighbourhood is given up.
-    together : (n,), optional
-        How many searches each direction r has; one if not given.
 
     Returns
     -------
@@ -70,18 +66,13 @@ def rays_towards(
     found, moved : (m,)
         Their rows, and how far along the line they start from where the search began, in cells.
     """
-    together = np.ones(len(times), dtype=np.int64) if together is None else together
-    if is_piecewise(tracer.body):
-        longest = np.full(len(times), STEP_ON_PIECES)
-    else:
-        longest = np.where(together > CROWDED, STEP, np.inf)
-    search = _Search(tracer, directions, observers, near, times, cell, longest)
+    search = _Search(tracer, directions, observers, near, times, cell)
     rays, found = search.result()
     return rays, found, search.moved[found]
 
 
 class _Search:
-    """What `rays_towards` finds; nothing where the first step would be longer than ``longest`` (n,), in cells.
+    """What `rays_towards` finds.
 
     Attributes
     ----------
@@ -97,7 +88,6 @@ class _Search:
         near: FloatArray,
         times: FloatArray,
         cell: FloatArray,
-        longest: FloatArray,
     ) -> None:
         n = len(times)
         self.tracer, self.directions, self.observers, self.cell = tracer, directions, observers, cell
@@ -107,22 +97,21 @@ class _Search:
         self.piecewise = is_piecewise(tracer.body)
         self.wide = np.maximum(cell, LEAST_CELL * size(tracer.body)) if self.piecewise else cell
         self.far = FAR_ON_PIECES if self.piecewise else FAR
-        patience = np.where(np.isinf(longest), ROUNDS, IDLE_ON_PIECES if self.piecewise else IDLE)
-        idle, best = np.zeros(n, dtype=np.int64), np.full(n, np.inf)
+        idle, best = np.zeros(n, dtype=bool), np.full(n, np.inf)
         active, self.wanted = np.arange(n), np.zeros(n, dtype=bool)
         for number in range(ROUNDS):
             residual, crossed = self._off(active), self._crossed(active)
             self.wanted[active] = residual <= NEARLY
             # curvature jumps at a joint: the first step across it may go too far
-            idle[active] = np.where((residual <= SLOW * best[active]) | crossed, 0, idle[active] + 1)
+            idle[active] = self.piecewise & (residual > SLOW * best[active]) & ~crossed
             best[active] = np.fmin(residual, best[active])
-            last = active[(residual > CLOSE) & self._within(active) & (idle[active] < patience[active])]
+            last = active[(residual > CLOSE) & self._within(active) & ~idle[active]]
             if not len(last):
                 break
             step = self._step(last)
             if number == 0:
-                idle[last[step > longest[last]]] = ROUNDS
-            active = last[~self.wanted[last] & (idle[last] < patience[last])]
+                idle[last] = step > (STEP_ON_PIECES if self.piecewise else STEP)
+            active = last[~self.wanted[last] & ~idle[last]]
             if not len(active):
                 break
 

@@ -32,7 +32,7 @@ from creeping.shadow.line import ShadowLine
 
 OF_CREASE = {"edge": RayStatus.EDGE, "tip": RayStatus.TIP}
 
-MANY, FEW = 4096, 32
+FEW_RAYS, FEW = 4096, 32
 """Rays that are enough for a line of several arcs to begin with, or so many for each in the mean: of many holes and
 fillets each has as many points as a body's only curve."""
 
@@ -126,7 +126,7 @@ class Starts(NamedTuple):
             shares = [(a.end - a.start) / line.curves[a.curve].length * len(line.curves[a.curve].points) for a in arcs]
             n_rays = sum(max(1, round(share)) for share in shares)
             if len(arcs) > 1:
-                n_rays = min(n_rays, max(MANY, FEW * len(arcs)))
+                n_rays = min(n_rays, max(FEW_RAYS, FEW * len(arcs)))
         launch = line.launch_points(max(n_rays, len(arcs)), launch_from)
         there = np.flatnonzero(launch.there[0])
         _, arc = np.unique(launch.arc_index[0, there], return_inverse=True)
@@ -154,6 +154,32 @@ class Starts(NamedTuple):
             state[mine] = line.curves[one.curve].state_at(position[mine])
         lengths = np.array([line.curves[one.curve].length for one in arcs])
         return cls(arcs, arc, position, points, state, np.full(len(arc), np.nan), position % lengths[arc])
+
+    def parting(self, points: FloatArray, gap: float, known: IntArray | None) -> tuple[IntArray, FloatArray]:
+        """Arcs and positions half-way between neighbours that come to part by more than ``gap``: (m,), (m,).
+
+        ``points`` (rays, steps, 3) are those of the rays. ``known`` (rays,) are the steps before each ray ends; what
+        comes after says nothing.
+        """
+        found = [(np.zeros(0, dtype=np.int64), np.zeros(0))]
+        for number, one in enumerate(self.arcs):
+            mine = np.flatnonzero(self.arc == number)
+            if len(mine) < 2:
+                continue
+            following, after = np.roll(mine, -1), np.roll(self.position[mine], -1)
+            after[-1] += one.end - one.start
+            if not one.closed:
+                mine, following, after = mine[:-1], following[:-1], after[:-1]
+            distance = np.linalg.norm(points[following] - points[mine], axis=-1)
+            if known is not None:
+                common = np.minimum(known[following], known[mine])
+                distance[np.arange(distance.shape[1]) >= common[:, None]] = 0.0
+            # below a spacing of rounding size more rays would tell nothing
+            wide = (np.max(distance, axis=-1) > gap) & (after - self.position[mine] > 1e-9 * (one.end - one.start))
+            middle = 0.5 * (self.position[mine] + after)[wide]
+            found.append((np.full(len(middle), number), middle))
+        arc, position = (np.concatenate(of) for of in zip(*found, strict=True))
+        return arc, position
 
     def joined(self, more: "Starts") -> tuple["Starts", IntArray]:
         """Both in order, and where each comes from in the one followed by the other."""

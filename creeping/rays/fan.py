@@ -34,16 +34,16 @@ from creeping.geometry.evaluators import speed_of, speed_values
 from creeping.geometry.memo import memo
 from creeping.geometry.piecewise import has_edges, is_piecewise
 from creeping.geometry.surface import Surface, fingerprint, size
-from creeping.rays.ends import Losses, Starts, ends_of, outline_share
+from creeping.rays.ends import FEW_RAYS, Losses, Starts, ends_of, outline_share
 from creeping.rays.reach import AUTO, HARD_DECAY, IN_RANGE, ray_length
 from creeping.rays.status import AT_CREASES, LAUNCHED, LINE_STATUS, RayStatus
 from creeping.rays.transport import Flow, carried, checked_flow, spread, zeros_passed
-from creeping.shadow.attachment import LaunchPoints, line_tangents, parting_positions
+from creeping.shadow.attachment import LaunchPoints, line_tangents
 from creeping.shadow.line import ShadowLine, checked_launch_from
 from creeping.shadow.status import NO_RAY
 from creeping.storage.memory import within_budget
 
-MAX_RAYS, GROWTH, FEW_RAYS, HALVED = 200_000, 32, 4096, 4
+MAX_RAYS, GROWTH, HALVED = 200_000, 32, 4
 """Rays beyond which refinement stops, also in units of those asked for, unless few; halvings of gaps at edges."""
 CHECKED_RAYS = 16
 """Rays that are traced directly to measure the error of a fan."""
@@ -271,9 +271,7 @@ def launch(
     states = _carry(flow, line, starts, times)
     most, passes = min(MAX_RAYS, max(GROWTH * len(starts.arc), FEW_RAYS)), HALVED if has_edges(body) else MAX_RAYS
     for _ in range(0 if np.isinf(gap) else passes):
-        arc, position = parting_positions(
-            states[..., X], starts.arcs, starts.arc, starts.position, gap, known_steps(states, times)
-        )
+        arc, position = starts.parting(states[..., X], gap, known_steps(states, times))
         if not len(arc) or len(starts.arc) + len(arc) > most:
             break
         more = Starts.at(line, starts.arcs, arc, position)

@@ -7,8 +7,7 @@ n.(d + r) = 0, n.d < 0, which meets the shadow line where n is perpendicular to 
 Sources: Derivations, R12, F10 and F11.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -16,6 +15,7 @@ from scipy.optimize.elementwise import find_root
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.geometry.curvature import bending, second_form
+from creeping.geometry.rows import Rows
 from creeping.geometry.surface import Surface, normal, size
 from creeping.rays.quantities import RayPoints
 from creeping.rays.strips import Strip, gather
@@ -23,25 +23,16 @@ from creeping.shadow.line import ShadowLine
 
 
 @dataclass(frozen=True, eq=False)
-class HorizonRays:
+class HorizonRays(Rows):
     """Nodes on creeping rays: observer row (n,), points (n,), and weight dσ⊥ (n,), L."""
 
     observer: IntArray
     rays: RayPoints
     weight: FloatArray
 
-    @classmethod
-    def joined(cls, parts: Sequence["HorizonRays"]) -> "HorizonRays":
-        """All parts as one."""
-        return cls(
-            np.concatenate([part.observer for part in parts]),
-            RayPoints.joined([part.rays for part in parts]),
-            np.concatenate([part.weight for part in parts]),
-        )
-
 
 @dataclass(frozen=True, eq=False)
-class MidHorizon:
+class MidHorizon(Rows):
     """Nodes on the bisector contour n.(d + r) = 0.
 
     Attributes
@@ -60,11 +51,6 @@ class MidHorizon:
     weight: FloatArray
     along: FloatArray
     across: FloatArray
-
-    @classmethod
-    def joined(cls, parts: Sequence["MidHorizon"]) -> "MidHorizon":
-        """All parts as one."""
-        return cls(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(cls)))
 
 
 def _polished(

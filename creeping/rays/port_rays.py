@@ -17,7 +17,7 @@ from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.equations import sharpest_curvature
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import M12, WITH_JACOBI, pack
-from creeping.geometry.directions import tangent_frames
+from creeping.geometry.directions import first_of_equals, tangent_frames
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.surface import Surface, normal, size
 from creeping.storage.memory import within_budget
@@ -31,10 +31,10 @@ TURN = 0.2
 RTOL = 1e-9
 """Relative tolerance of rays. Twice as many rays, half of the gaps and steps, and a tenth of the tolerance find the
 same geodesics (``tests/rays/test_port_rays.py``)."""
-NODE_BYTES = 600.0
-"""Of a fan's node: two states with their Jacobi fields, and what is carried."""
 NODES = 400_000
 """Nodes of fans that are held at once: 60 MB."""
+SAME = 1e-4
+"""Distance of two passages, in rays and in steps, below which they are one found twice."""
 PER_PAIR = 3
 """Geodesics for which there is place at first, for each pair of ports."""
 
@@ -144,10 +144,10 @@ def rays_between(
 
     normals = normal(body, ports)
     steps = np.maximum(16, np.ceil(length * sharpest_curvature(body) / TURN))
-    within_budget(NODE_BYTES * RAYS * steps, f"fans of length {length:g}", "give a shorter length", asked=length)
+    # of a node two states with their Jacobi fields, and what is carried
+    within_budget(600.0 * RAYS * steps, f"fans of length {length:g}", "give a shorter length", asked=length)
     steps = int(steps)
     times = length / steps * np.arange(steps + GUARD + 1, dtype=float)
-    boxes = _boxes(ports)
     senders = len(ports) if sources is None else sources
     within_budget(24.0 * PER_PAIR * (LANES + START + 3) * len(ports) * senders, f"{len(ports)} ports", "ask for fewer")
     folds = np.full((2, senders, len(ports)), np.inf)
@@ -160,7 +160,7 @@ def rays_between(
             numbers = mine[begin : begin + some]
             states = traced_fans(body, ports[numbers], normals[numbers], int(rays), times)
             for number, fan in zip(numbers, states, strict=True):
-                owner, found = _passages(body, fan, times[1], ports, int(number), boxes, pad, folds[:, number])
+                owner, found = _passages(body, fan, times[1], ports, int(number), pad, folds[:, number])
                 owners.append((np.full(len(owner), number), owner))
                 rows.append(found)
                 wide.append(np.full(len(owner), rays))
@@ -192,44 +192,41 @@ def traced_fans(body: Surface, ports: FloatArray, normals: FloatArray, rays: int
     return states.reshape(len(ports), rays, len(times), -1)
 
 
-def _boxes(ports: FloatArray) -> tuple[IntArray, FloatArray, float, IntArray, IntArray]:
-    """Boxes of ports: numbers along the axes, a corner, the edge, the first member of each, and the members."""
-    low, high = ports.min(axis=0), ports.max(axis=0)
-    edge = max(
-        float(np.max(high - low)) / max(1.0, np.sqrt(len(ports) / 2)), 1e-9 * float(np.max(np.abs(high))), 1e-300
-    )
-    grid = np.maximum(1, np.floor((high - low) / edge).astype(np.int64) + 1)
-    place = np.minimum(np.floor((ports - low) / edge).astype(np.int64), grid - 1)
-    box = (place[:, 0] * grid[1] + place[:, 1]) * grid[2] + place[:, 2]
-    members = np.argsort(box, kind="stable")
-    starts = np.searchsorted(box[members], np.arange(int(np.prod(grid)) + 1))
-    return grid, low, edge, starts.astype(np.int64), members.astype(np.int64)
-
-
 def _passages(
     body: Surface,
     states: FloatArray,
     step: float,
     ports: FloatArray,
     number: int,
-    boxes: tuple[IntArray, FloatArray, float, IntArray, IntArray],
     pad: float,
     folds: FloatArray,
 ) -> tuple[IntArray, FloatArray]:
     """Ports of higher numbers that one fan passes (m,), and what is known there; fills ``folds`` (2, n)."""
-    from creeping.rays.kernels.port_fans import BEHIND, LANES, START, passed, port_fan
+    from creeping.rays.kernels.port_fans import AHEAD, BEHIND, LANES, START, passed, port_fan
+    from creeping.rays.kernels.quantities import polynomial_matrix
 
     rays, count = states.shape[:2]
     lanes, last = np.zeros((rays, count - 4 + BEHIND, LANES)), np.zeros(rays, dtype=np.int64)
     with evaluators(body) as parts:
         port_fan(parts.level, parts.level_parameters, step, size(body), 1.0, states, lanes, last)
+    axis = int(np.argmax(np.ptp(ports, axis=0)))
+    order = np.argsort(ports[:, axis], kind="stable")
+    matrices = polynomial_matrix(AHEAD), np.pad(polynomial_matrix(2), ((0, 2), (1, 1)))
     most, ports = PER_PAIR * len(ports) + 64, np.ascontiguousarray(ports)
     while True:
         owner, found = np.empty(most, dtype=np.int64), np.empty((most, LANES + START + 3))
-        total = passed(lanes, last, ports, number, *boxes, pad, folds, owner, found)
+        total = passed(lanes, last, matrices, ports, order, axis, number, pad, folds, owner, found)
         if total <= most:
-            return owner[:total], found[:total]
+            break
         most = total
+    owner, found = owner[:total], found[:total]
+
+    def alike(i: IntArray, j: IntArray) -> BoolArray:
+        turn, later = np.abs(found[i, :2] - found[j, :2]).T
+        return np.asarray((np.minimum(turn, rays - turn) < SAME) & (later < SAME))
+
+    kept = first_of_equals(owner, alike)
+    return owner[kept], found[kept]
 
 
 def _assembled(
@@ -259,19 +256,19 @@ def _assembled(
     facing = np.sum(arriving * normals[second], axis=1, keepdims=True)
     arriving = arriving - facing * normals[second]
     arriving /= np.linalg.norm(arriving, axis=1, keepdims=True)
-    J2, rate = known[:, lane.SPREADING], known[:, lane.RATE]
+    J2, rate = known[:, lane.LANE.J2], known[:, lane.LANE.rate]
     principal = np.arctan2(J2, size(body) * rate)
     # J2 > 0 for angles from 0 to pi: whole half turns beyond are zeros
     principal = np.where(principal < 0, principal + np.pi, principal)
-    caustics = np.maximum(np.rint((known[:, lane.ANGLE] - principal) / np.pi), 0).astype(np.int64)
+    caustics = np.maximum(np.rint((known[:, lane.LANE.angle] - principal) / np.pi), 0).astype(np.int64)
 
     def ends(of: int) -> FloatArray:
-        return np.stack([start[:, of - lane.CURVATURE], known[:, of]], axis=1)
+        return np.stack([start[:, of - lane.LANE.kappa], known[:, of]], axis=1)
 
     # of the Jacobi field that is 1 at the first end and 0 at the second
     with np.errstate(divide="ignore", invalid="ignore"):
-        aside = known[:, lane.TURNING] / J2
-        turning = np.stack([known[:, lane.MOVING] - known[:, lane.BACK] * aside, aside], axis=1)
+        aside = known[:, lane.LANE.turning] / J2
+        turning = np.stack([known[:, lane.LANE.moving] - known[:, lane.LANE.M11] * aside, aside], axis=1)
     return PortRays(
         body=body,
         ports=ports,
@@ -283,12 +280,12 @@ def _assembled(
         points=ports[np.stack([first, second], axis=1)],
         directions=np.stack([leaving, arriving], axis=1),
         spreading=J2,
-        rates=np.stack([known[:, lane.BACK], rate], axis=1),
+        rates=np.stack([known[:, lane.LANE.M11], rate], axis=1),
         caustics=caustics,
-        curvature=ends(lane.CURVATURE),
-        torsion=ends(lane.TORSION),
-        bend=ends(lane.BEND),
-        integrals=known[:, lane.INTEGRALS : lane.INTEGRALS + lane.PARTS],
+        curvature=ends(lane.LANE.kappa),
+        torsion=ends(lane.LANE.T),
+        bend=ends(lane.LANE.B),
+        integrals=known[:, lane.LANE.integrals : lane.LANE.integrals + lane.PARTS],
         turning=turning,
         error=start[:, lane.START],
         folds=folds[0],

@@ -12,12 +12,12 @@ interpolation, and the integrals end where κₙ first falls to 0: there the cre
 Sources: Derivations, R1, R5 and F4.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from creeping._typing import Any, BoolArray, FloatArray, IntArray
+from creeping._typing import BoolArray, FloatArray, IntArray
+from creeping.geometry.rows import Rows
 
 LANES = 18
 """x (3), p (3), J, J', φ, κₙ, κₙ', κₙ'', κ_t, and the five integrals."""
@@ -35,7 +35,7 @@ the expansion that uses them has no meaning."""
 
 
 @dataclass(frozen=True, eq=False)
-class RayPoints:
+class RayPoints(Rows):
     """Points on creeping rays, arrays of one shape (...) with lanes last.
 
     Attributes
@@ -56,17 +56,6 @@ class RayPoints:
     time: FloatArray
     alive: BoolArray
     scale: float
-
-    def __getitem__(self, index: Any) -> "RayPoints":
-        """Part of the points, by an index of the leading axes."""
-        return RayPoints(self.lanes[index], self.starts[index], self.time[index], self.alive[index], self.scale)
-
-    @classmethod
-    def joined(cls, parts: Sequence["RayPoints"]) -> "RayPoints":
-        """Points (n,) of several parts as one; they have a scale in common."""
-        arrays = ([getattr(part, name) for part in parts] for name in ("lanes", "starts", "time", "alive"))
-        lanes, starts, time, alive = (np.concatenate(list(values)) for values in arrays)
-        return cls(lanes, starts, time, alive, parts[0].scale)
 
     @property
     def points(self) -> FloatArray:

@@ -26,8 +26,7 @@ from creeping.geometry.memo import memo
 from creeping.geometry.surface import Surface, size
 from creeping.rays.transport import carried
 from creeping.shadow.attachment import LaunchPoints
-from creeping.shadow.line import ShadowLine
-from creeping.shadow.many import shadow_lines
+from creeping.shadow.line import ShadowLine, shadow_lines
 
 LEAST_SIZES, MOST_SIZES = 1e-6, 1e5
 """Length of rays that can be meant, in body sizes: beyond, phases have no digits left."""

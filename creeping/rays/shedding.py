@@ -16,9 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from creeping._typing import Any, BoolArray, FloatArray, IntArray
+from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.geometry.directions import first_of_equals, tangent_frames
 from creeping.geometry.quadrature import SYMMETRIC, nearest_points
+from creeping.geometry.rows import Rows
 from creeping.geometry.surface import Surface, normal, project, size
 from creeping.rays.quantities import RayPoints
 from creeping.rays.strips import Strip, gather
@@ -33,7 +34,7 @@ CLOSE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class ShedRays:
+class ShedRays(Rows):
     """Rays that reach observers.
 
     Attributes
@@ -55,10 +56,6 @@ class ShedRays:
     sigma: FloatArray
     rays: RayPoints
     reach: FloatArray
-
-    def __getitem__(self, index: Any) -> "ShedRays":
-        """Some of them."""
-        return ShedRays(self.observer[index], self.strip[index], self.sigma[index], self.rays[index], self.reach[index])
 
 
 _Functions = tuple[FloatArray, FloatArray, Callable[[IntArray, IntArray], BoolArray]]
@@ -150,19 +147,17 @@ def _search(
     more: _Places | None = None,
 ) -> tuple[IntArray, IntArray, FloatArray, RayPoints]:
     """Solve on all strips, from cells and from places besides: observers (n,), strips (n,), positions (n,), points."""
-    observer, which, sigma, s = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)], [np.zeros(0)], [np.zeros(0)]
+    none = np.zeros(0, dtype=int)
+    found = [(none, none, np.zeros(0), np.zeros(0))]
     for k, strip in enumerate(strips):
         seeds = _seeds(strip, body, targets, functions)
         if more is not None:
             its = more[1] == k
             seeds = tuple(np.concatenate([one, more[i][its]]) for one, i in zip(seeds, (0, 2, 3), strict=True))  # type: ignore[assignment]
-        row, at_sigma, at_s = _newton(strip, targets, *seeds, step)
-        observer.append(row)
-        which.append(np.full(len(row), k))
-        sigma.append(at_sigma)
-        s.append(at_s)
-    strip_of, position = np.concatenate(which), np.concatenate(sigma)
-    return np.concatenate(observer), strip_of, position, gather(strips, strip_of, position, np.concatenate(s))
+        row, sigma, s = _newton(strip, targets, *seeds, step)
+        found.append((row, np.full(len(row), k), sigma, s))
+    observer, which, sigma, s = (np.concatenate(of) for of in zip(*found, strict=True))
+    return observer, which, sigma, gather(strips, which, sigma, s)
 
 
 def _seeds(

@@ -15,7 +15,7 @@ ground gives; nor does it on a facet or a cylinder, where the zone is without en
 Sources: Derivations, F13.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geometry.curvature import bending
 from creeping.geometry.directions import first_of_equals, tangent_frames
 from creeping.geometry.piecewise import SMOOTH, nearest_crease, pieces_of, tiles_of
+from creeping.geometry.rows import Rows
 from creeping.geometry.surface import Surface, normal, project, size
 from creeping.geometry.triangulation import Triangulation, triangulate
 from creeping.shadow.attachment import occluded
@@ -45,7 +46,7 @@ OUTWARD = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
-class SpecularPoints:
+class SpecularPoints(Rows):
     """Specular points that the wave reaches and whose reflected ray leaves the body.
 
     Attributes
@@ -267,7 +268,7 @@ def specular_on_pieces(
             r = observers[points.observer]
             there = (np.asarray(body.piece(points.points)) == number) & ~occluded(body, x, direction)
             there &= ~occluded(body, x, -r) & (points.normals @ direction < 0)
-        found.append(some(points, there))
+        found.append(points[there])
     return found
 
 
@@ -283,13 +284,3 @@ def stand_clear(body: Any, points: SpecularPoints, wavenumber: float) -> BoolArr
 
 def _is_flat(piece: Any, x: FloatArray, scale: float) -> bool:
     return bool(np.max(np.linalg.norm(bending(piece, x)[1], axis=(1, 2))) * scale < FLAT)
-
-
-def some(points: SpecularPoints, rows: BoolArray | IntArray) -> SpecularPoints:
-    """Part of specular points."""
-    return SpecularPoints(*(getattr(points, one.name)[rows] for one in fields(points)))
-
-
-def joined(parts: list[SpecularPoints]) -> SpecularPoints:
-    """All of several."""
-    return SpecularPoints(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(parts[0])))

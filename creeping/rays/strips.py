@@ -15,6 +15,7 @@ from scipy.sparse.linalg import splu
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.geometry.incident import headings, openings
+from creeping.geometry.memo import memo
 from creeping.geometry.surface import Surface, normal
 from creeping.rays.fan import RayFan
 from creeping.rays.quantities import LANES, START_LANES, RayPoints
@@ -113,11 +114,7 @@ class Strip:
 
     def coarse_normals(self, body: Surface) -> FloatArray:
         """n at the coarse steps of the rays, found once: (rays, coarse steps, 3)."""
-        known = vars(self)
-        if "coarse normals" not in known:
-            known["coarse normals"] = normal(body, self.rays.points[:, self.coarse_steps])
-        found: FloatArray = known["coarse normals"]
-        return found
+        return memo(self, "coarse normals", lambda: normal(body, self.rays.points[:, self.coarse_steps]))
 
     @property
     def coarse_steps(self) -> IntArray:
@@ -222,12 +219,8 @@ def gather(strips: tuple[Strip, ...], which: IntArray, sigma: FloatArray, s: Flo
     parts = [(np.flatnonzero(which == k), strip) for k, strip in enumerate(strips)]
     parts = [(rows, strip) for rows, strip in parts if len(rows)]
     if not parts:
-        empty = strips[0].rays if strips else None
-        if empty is None:
-            return RayPoints(
-                np.zeros((0, LANES)), np.zeros((0, START_LANES)), np.zeros(0), np.zeros(0, dtype=bool), 1.0
-            )
-        return empty[np.zeros(0, dtype=int), np.zeros(0, dtype=int)]
+        none, scale = np.zeros(0), strips[0].rays.scale if strips else 1.0
+        return RayPoints(np.zeros((0, LANES)), np.zeros((0, START_LANES)), none, none > 0, scale)
     found = [strip.at(sigma[rows], s[rows]) for rows, strip in parts]
     order = np.argsort(np.concatenate([rows for rows, _ in parts]))
     return RayPoints.joined(found)[order]

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from creeping._typing import Any, BoolArray, FloatArray, IntArray
+from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.geodesics.equations import sharpest_curvature
 from creeping.geodesics.integrator import trace_states
@@ -23,10 +23,11 @@ from creeping.geodesics.pieces import trace_pieces, trace_to
 from creeping.geodesics.states import M11, M12, M21, M22, P, X, pack
 from creeping.geometry.evaluators import evaluators, speed_of
 from creeping.geometry.piecewise import is_piecewise, piece_ahead, pieces_of
+from creeping.geometry.rows import Rows
 from creeping.geometry.surface import Surface, size
 from creeping.rays.ends import non_smooth_from
 from creeping.rays.quantities import GAUSS, GUARD, LANES, START_LANES, RayPoints
-from creeping.shadow.moving import moved_onto_lines
+from creeping.shadow.curves import moved_onto_lines
 
 TURN = 0.12
 """Largest angle by which a ray turns in one step: polynomials of degree 9 then err by about 1e-9."""
@@ -37,7 +38,7 @@ TOGETHER, TOGETHER_ON_PIECES = 192, 2048
 
 
 @dataclass(frozen=True, eq=False)
-class SingleRays:
+class SingleRays(Rows):
     """Rays (n,), each with its incidence.
 
     Attributes
@@ -58,12 +59,6 @@ class SingleRays:
     tangents: FloatArray
     rays: RayPoints
     risen: BoolArray
-
-    def __getitem__(self, index: Any) -> "SingleRays":
-        """Part of the rays."""
-        return SingleRays(
-            self.directions[index], self.starts[index], self.tangents[index], self.rays[index], self.risen[index]
-        )
 
 
 class RayTracer:
@@ -91,7 +86,7 @@ class RayTracer:
         self.steps = max(16, int(np.ceil(length * sharpest_curvature(body) / turn)))
         self.step = length / self.steps
         nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
-        self._rule = polynomial_matrix(), 0.5 * (nodes + 1), 0.5 * weights
+        self._rule = polynomial_matrix(GUARD), 0.5 * (nodes + 1), 0.5 * weights
 
     def onto_line(self, points: FloatArray, directions: FloatArray, steps: int = 4) -> tuple[FloatArray, FloatArray]:
         """Points of the shadow lines next to the given ones, and T there: (n, 3), (n, 3)."""

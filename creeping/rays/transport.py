@@ -140,13 +140,8 @@ def spread(
 def zeros_passed(spreading: FloatArray) -> IntArray:
     """Sign changes of J up to each step; a step that lands on a zero counts once it is passed."""
     sign = np.sign(spreading)
-    if np.all(sign):
-        flips = sign[:, 1:] * sign[:, :-1] < 0
-        return np.concatenate([np.zeros_like(flips[:, :1], dtype=np.int64), np.cumsum(flips, axis=1)], axis=1)
-    count = np.zeros(sign.shape, dtype=np.int64)
-    last = sign[:, 0].copy() if sign.shape[1] else np.zeros(0)
-    for k in range(1, sign.shape[1]):
-        flipped = sign[:, k] * last < 0
-        count[:, k] = count[:, k - 1] + flipped
-        last = np.where(sign[:, k] != 0, sign[:, k], last)
-    return count
+    # the last step of each at which J was not 0
+    last = np.maximum.accumulate(np.where(sign != 0, np.arange(sign.shape[1]), 0), axis=1)
+    sign = np.take_along_axis(sign, last, axis=1)
+    flips = np.concatenate([0 * sign[:, :1], sign[:, 1:] * sign[:, :-1]], axis=1) < 0
+    return np.cumsum(flips, axis=1)

@@ -19,13 +19,11 @@ from creeping.geometry.incident import headings, openings
 from creeping.geometry.surface import project
 from creeping.rays.fan import RayFan, launch
 from creeping.rays.status import RayStatus
+from creeping.rays.tracer import RTOL
 from creeping.rays.transport import spread
 from creeping.shadow.attachment import line_tangents
 from creeping.shadow.line import shadow_line
 from creeping.storage.memory import within_budget
-
-RAYS = 48
-RTOL = 1e-10
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ class BodyUncertainty:
     rays: int
 
 
-def body_uncertainty(fan: RayFan, *, n_rays: int = RAYS) -> BodyUncertainty | None:
+def body_uncertainty(fan: RayFan, *, n_rays: int = 48) -> BodyUncertainty | None:
     """Estimate the error of a fan caused by the uncertain shape of its body.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Attachment points: where creeping rays are launched from the shadow line, and new ones where rays part.
+"""Attachment points: where creeping rays are launched from the shadow line.
 
 A position is (arc, arclength) with the arclength unwrapped, so that it grows along an arc that crosses the start of its
 closed curve; the point is that of the arclength modulo the curve's length.
@@ -11,7 +11,6 @@ the ray enters the body where F is negative at a sample, or at a minimum between
 Sources: [K84]; Derivations, R10.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
@@ -22,14 +21,13 @@ from creeping.errors import InvalidInputError
 from creeping.geometry.incident import REMEDY, headings, openings, optical_paths, spherical
 from creeping.geometry.parts import is_faceted, why_no_rays
 from creeping.geometry.piecewise import is_convex, is_piecewise
+from creeping.geometry.rows import Rows
 from creeping.geometry.surface import Surface, size
 from creeping.kernels.threads import in_slices
 from creeping.shadow.status import NO_RAY
 
 SAMPLES = 192
 """Samples of F from a point to where its backward ray leaves the box."""
-MINIMUM = 6
-"""Newton steps to a minimum of F between samples."""
 SLICE = 256
 """Rays at a time."""
 ABOVE = 1e-5
@@ -46,7 +44,7 @@ class Arc(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class LaunchPoints:
+class LaunchPoints(Rows):
     """Places for so many rays on the shadow lines of n incidences.
 
     Attributes
@@ -86,11 +84,6 @@ class LaunchPoints:
         for one in fields(self)[1:]:
             getattr(self, one.name)[rows] = getattr(those, one.name)
 
-    @classmethod
-    def together(cls, parts: Sequence["LaunchPoints"]) -> "LaunchPoints":
-        """Those of several sets of incidences, one after the other."""
-        return cls(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(cls)))
-
     @property
     def directions(self) -> FloatArray:
         """Unit vectors d (n, 3) of plane waves; see `headings` for others."""
@@ -118,10 +111,6 @@ class LaunchPoints:
         """Whether a place holds a ray (n, rays)."""
         return np.asarray(self.curve_index != NO_RAY)
 
-    def of(self, rows: IntArray) -> "LaunchPoints":
-        """Those of some incidences."""
-        return LaunchPoints(*(getattr(self, part.name)[rows] for part in fields(self)))
-
 
 def evenly_chosen(there: BoolArray, most: int) -> BoolArray:
     """At most so many of the places of each row that hold a ray, evenly spread over them: (n, rays) -> (n, rays).
@@ -134,43 +123,6 @@ def evenly_chosen(there: BoolArray, most: int) -> BoolArray:
     every = np.maximum(there.sum(axis=1, keepdims=True) / most, 1.0)
     number = np.cumsum(there, axis=1) - 1
     return np.asarray(there & ((np.floor(number / every) > np.floor((number - 1) / every)) | (number == 0)))
-
-
-def parting_positions(
-    points: FloatArray,
-    arcs: list[Arc],
-    arc: IntArray,
-    arclength: FloatArray,
-    gap: float,
-    known: IntArray | None = None,
-) -> tuple[IntArray, FloatArray]:
-    """Positions half-way between neighbours that come to part by more than ``gap``: (m,), (m,).
-
-    ``points`` (rays, steps, 3) are in the order of the positions: by arc, then by arclength. ``known`` (rays,) are the
-    steps before each ray ends; what comes after says nothing.
-    """
-    new_arc, new_arclength = [], []
-    for k, one in enumerate(arcs):
-        mine = np.flatnonzero(arc == k)
-        if len(mine) < 2:
-            continue
-        following = np.roll(mine, -1)
-        after = arclength[following].copy()
-        after[-1] += one.end - one.start
-        if not one.closed:
-            mine, following, after = mine[:-1], following[:-1], after[:-1]
-        distance = np.linalg.norm(points[following] - points[mine], axis=-1)
-        if known is not None:
-            common = np.minimum(known[following], known[mine])
-            distance[np.arange(distance.shape[1]) >= common[:, None]] = 0.0
-        apart = np.max(distance, axis=-1)
-        # below a spacing of rounding size more rays would tell nothing
-        wide = (apart > gap) & (after - arclength[mine] > 1e-9 * (one.end - one.start))
-        new_arc.append(np.full(int(wide.sum()), k, dtype=np.int64))
-        new_arclength.append(0.5 * (arclength[mine] + after)[wide])
-    if not new_arc:
-        return np.zeros(0, dtype=np.int64), np.zeros(0)
-    return np.concatenate(new_arc), np.concatenate(new_arclength)
 
 
 def line_tangents(body: Surface, points: FloatArray, direction: FloatArray) -> FloatArray:
@@ -219,7 +171,7 @@ def occluded(body: Surface, points: FloatArray, direction: FloatArray, reach: Fl
 def _dips(body: Surface, points: FloatArray, d: FloatArray, t: FloatArray, h: FloatArray) -> BoolArray:
     """Whether F < 0 at its minimum on x - t d within h of t: (m, 3), (m, 3), (m,), (m,) -> (m,)."""
     start = t
-    for _ in range(MINIMUM):
+    for _ in range(6):
         x = points - t[:, None] * d
         slope = -np.sum(body.gradient(x) * d, axis=1)
         bend = np.einsum("mi,mij,mj->m", d, body.hessian(x), d)

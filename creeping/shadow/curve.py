@@ -6,8 +6,8 @@ Sources: Derivations, R6.
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -17,9 +17,8 @@ from creeping.errors import InvalidInputError
 from creeping.geometry.checks import unit_of
 from creeping.geometry.incident import REMEDY, headings, spherical
 from creeping.geometry.surface import Surface
-from creeping.shadow.curves import LineNodes, interpolated
-from creeping.shadow.nodes import polished
-from creeping.shadow.panels import PanelCurve, fit_panels
+from creeping.shadow.curves import LineNodes, interpolated, polished
+from creeping.shadow.panels import PanelCurve
 from creeping.shadow.status import CONCAVE, STATUSES
 
 
@@ -57,6 +56,8 @@ class ShadowCurve(DrawnOnBody):
         For an open curve, numbers of the creases at its start and end.
     goes_on : tuple of int
         For an open curve, numbers of the curves that continue it across a joint at its start and end; -1 for none.
+    panels : PanelCurve or None
+        The curve exact to rounding: on a piece, and where it turns so fast that its nodes are too far apart.
     """
 
     body: Surface
@@ -75,6 +76,7 @@ class ShadowCurve(DrawnOnBody):
     piece: int = -1
     creases: tuple[int, int] = (-1, -1)
     goes_on: tuple[int, int] = (-1, -1)
+    panels: PanelCurve | None = None
 
     @property
     def direction(self) -> FloatArray:
@@ -96,21 +98,6 @@ class ShadowCurve(DrawnOnBody):
             shares[status] += (end - start) / self.length
         return shares
 
-    @cached_property
-    def panels(self) -> PanelCurve:
-        """The curve in panels that are exact to rounding, fitted when first asked for."""
-        spacing = np.full(len(self.nodes), self.length / len(self.nodes))
-        return fit_panels(self.body, self.wave, self.nodes, spacing)
-
-    def line_nodes(self) -> LineNodes:
-        """The curve as the nodes of a line of its own."""
-        if self.piece >= 0:
-            x, tangents, curvature = self.nodes, self.tangents, self.curvature
-        else:
-            x, tangents, curvature = polished(self.body, self.wave, self.nodes)
-        spacing = np.array([self.length / len(x)])
-        return LineNodes(x, tangents, curvature, np.array([0, len(x)]), spacing, self.error)
-
     def state_at(self, arclength: FloatArray) -> IntArray:
         """Codes of the status at arclengths modulo the length, of an open curve no further than its ends: (m,)."""
         # rounding may leave a place between two arcs: then it is of neither side, and concave launches nothing
@@ -130,7 +117,7 @@ class ShadowCurve(DrawnOnBody):
             raise InvalidInputError(
                 f"arclength of shape {s.shape} is not one finite number or a row of them; give (m,)"
             )
-        if "panels" in vars(self):
+        if self.panels is not None:
             return self.panels.at(s.ravel()).reshape(*s.shape, 3)
         points = interpolated(self.nodes, 0, len(self.nodes), s.ravel() / self.length * len(self.nodes))
         return polished(self.body, self.wave, points)[0].reshape(*s.shape, 3)
@@ -143,6 +130,19 @@ class ShadowCurve(DrawnOnBody):
             f"  |n.d| at most {np.max(np.abs(self.grazing)):.1e}; "
             f"kappa_n(d) from {np.min(self.curvature):.3g} to {np.max(self.curvature):.3g} 1/{unit}"
         )
+
+
+def nodes_of(curves: Sequence[ShadowCurve]) -> LineNodes:
+    """Curves as the nodes of a line of their own."""
+    found = [(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))]
+    for curve in curves:
+        x = curve.nodes
+        there = (x, curve.tangents, curve.curvature) if curve.piece >= 0 else polished(curve.body, curve.wave, x)
+        found.append(there)
+    points, tangents, curvature = (np.concatenate(of) for of in zip(*found, strict=True))
+    starts = np.cumsum([len(of[0]) for of in found], dtype=np.int64)
+    spacing = np.array([curve.length / len(curve.nodes) for curve in curves], dtype=float)
+    return LineNodes(points, tangents, curvature, starts, spacing, max((curve.error for curve in curves), default=0.0))
 
 
 def spelled(fractions: dict[str, float]) -> str:

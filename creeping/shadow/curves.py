@@ -1,5 +1,7 @@
 """The closed curves of shadow lines as equally spaced nodes, those of many lines together, and places between them.
 
+Also here: points next to shadow lines moved onto them, each onto the line of its own wave.
+
 A place is a number of nodes with a fraction, u; between nodes a quantity is the polynomial of degree 2 HALF - 1 through
 the nodes around. What is done here for one curve does not depend on the others.
 
@@ -9,11 +11,18 @@ Sources: Derivations, R6 and R8.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from creeping._typing import FloatArray, IntArray
+from creeping.geometry.evaluators import evaluators
+from creeping.geometry.incident import rows_of
+from creeping.geometry.surface import Surface, size
+from creeping.kernels.threads import in_threads
 
+NEAR = 1e-2
+"""Longest step, in body sizes, that brings an interpolated point onto the line; nodes are much closer."""
 HALF = 6
 """Nodes on either side that a polynomial along a curve goes through."""
 _OFFSETS = np.arange(1 - HALF, HALF + 1)
@@ -140,3 +149,56 @@ def interpolated(rows: FloatArray, first: IntArray | int, number: IntArray | int
     for j in range(1, 2 * HALF):
         total += weights[:, j : j + 1] * rows[around[:, j]]
     return np.asarray(total)
+
+
+class Moved(NamedTuple):
+    """Points on lines (n, 3), L, with the lines' unit tangents (n, 3) and kappa_n(q) (n,), 1/L.
+
+    ``left`` (n,) are the sizes of the steps that would follow, L. Of points without a step nothing is finite.
+    """
+
+    points: FloatArray
+    tangents: FloatArray
+    curvature: FloatArray
+    left: FloatArray
+
+
+def moved_onto_lines(body: Surface, waves: FloatArray, points: FloatArray, *, reach: float, steps: int) -> Moved:
+    """Points of {F = 0, grad F.q = 0} by Newton steps of least norm, the same to the last bit alone or with others.
+
+    Parameters
+    ----------
+    body : Surface
+    waves : (n, 3) or (n, 4), or (3,) or (4,) of one for all
+        d of plane waves, or (d, w).
+    points : (n, 3), L
+        Next to the lines of their waves.
+    reach : float, L
+        Longest step.
+    steps : int
+        At most so many; a point stays where its next one would be rounding.
+    """
+    from creeping.shadow.kernels.newton import move, work_space
+
+    # of arrays of another kind kernels would be compiled once more
+    waves = np.array(np.broadcast_to(rows_of(waves), (len(points), 4)), order="C")
+    n, found = len(points), np.array(points, dtype=float, order="C")
+    tangents, curvature, left = np.empty_like(found), np.empty(n), np.empty(n)
+    with evaluators(body) as parts:
+
+        def run(part: slice) -> None:
+            out = tangents[part], curvature[part], left[part]
+            move(*parts[:2], waves[part], found[part], reach, steps, work_space(), *out)
+
+        in_threads(run, n)
+    return Moved(found, tangents, curvature, left)
+
+
+def tangents_at(body: Surface, wave: FloatArray, points: FloatArray) -> FloatArray:
+    """T at points of a line: (n, 3) -> (n, 3)."""
+    return moved_onto_lines(body, wave, points, reach=0.0, steps=0).tangents
+
+
+def polished(body: Surface, wave: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Points next to a line moved onto it, with T and kappa_n(q): (n, 3) -> (n, 3), (n, 3), (n,)."""
+    return moved_onto_lines(body, wave, points, reach=NEAR * size(body), steps=2)[:3]

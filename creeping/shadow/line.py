@@ -1,40 +1,43 @@
-"""The shadow line of an incident wave: the curves n.q = 0 on the body, and what part of them launches rays.
-
-Sources: Derivations, R6 and R19.
+"""The shadow line of an incident wave, and those of many: the curves n.q = 0, and what part of them launches rays.
 
     F(x) = 0,   grad F(x).q = 0,   T = grad F x Hq / |.|,   kappa_n = q.Hq/(|grad F| |q|^2)
 
-q = d of a plane wave, x - x_s of a point source. Seen from outside, the lit side (n.q < 0) is on the left of T. The
-line is that of `creeping.shadow.many`, the same to the last bit; next to a singular direction, where that cannot be
-certain, its topology is proven (`following`).
+q = d of a plane wave, x - x_s of a point source. Seen from outside, the lit side (n.q < 0) is on the left of T. Each
+line is sought on the coarsest mesh, and again on the next where a step was not certain of it. What the finest does not
+resolve, and a single line next to a singular direction, is followed by itself, with its topology proven
+(`refinement`).
+
+Sources: Derivations, R6, R7 and R19.
 """
 
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from creeping._presenting import DrawnOnBody, brief
-from creeping._typing import ArrayLike, FloatArray
-from creeping.errors import InvalidInputError
+from creeping._typing import Any, ArrayLike, BoolArray, FloatArray, IntArray
+from creeping.errors import InvalidInputError, SingularIncidenceError
 from creeping.geometry.arguments import checked_body, whole_number
 from creeping.geometry.checks import unit_of
 from creeping.geometry.evaluators import speed_of
 from creeping.geometry.incident import Incident, PointSource, incident_of, plane_direction, rows_of
 from creeping.geometry.piecewise import is_piecewise
+from creeping.geometry.rows import Rows
 from creeping.geometry.surface import Surface, normal, size
-from creeping.shadow.arcs import Arcs, finished
+from creeping.kernels.threads import in_threads
+from creeping.shadow.arcs import Arcs, Finished, finished
 from creeping.shadow.attachment import Arc, LaunchPoints
-from creeping.shadow.curve import ShadowCurve, counted, spelled
-from creeping.shadow.curves import Curves, LineNodes, interpolated
-from creeping.shadow.edges import EdgePart
-from creeping.shadow.following import followed
-from creeping.shadow.nodes import clearance, line_nodes, polished
+from creeping.shadow.curve import ShadowCurve, counted, nodes_of, spelled
+from creeping.shadow.curves import Curves, LineNodes, interpolated, polished
+from creeping.shadow.meshes import LineMeshes, clearance, critical_distances, judged, prepared, traced
 from creeping.shadow.panels import PanelCurve
-from creeping.shadow.piecewise import launched_from, piecewise_curves
-from creeping.shadow.status import NEAR_SINGULAR, STATUSES
+from creeping.shadow.piecewise import EdgePart, launched_from, piecewise_curves
+from creeping.shadow.refinement import FORBIDDEN, followed
+from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, OK, SINGULAR, STATUSES
 from creeping.storage.memory import within_budget
 
 NEAREST, FARTHEST = 1e-5, 1e6
@@ -210,20 +213,25 @@ def shadow_line(
     if isinstance(incident, PointSource):
         _checked_height(body, incident)
     d = incident.row(body)
-    line, code, distance = line_nodes(body, d)
+    row, lines = rows_of(d)[None], list[tuple[LineNodes, Finished]]()
+
+    def take(_: IntArray, nodes: Sequence[LineNodes]) -> BoolArray:
+        lines.append((nodes[0], finished(body, Curves.of(row, nodes), 0)))
+        return lines[-1][1].certain
+
+    status, distances = _on_meshes(body, row, take)
+    code, distance = int(status[0]), float(distances[0])
     panels: tuple[PanelCurve, ...] = ()
-    if line is None or code == NEAR_SINGULAR:
-        exact, panels, distance = followed(body, d)
-        if line is not None and len(line[0].spacing) == len(panels):
+    if code != OK:
+        exact, panels, distance = followed(body, d, prepared(body).coarsest)
+        if code == NEAR_SINGULAR and len(lines[-1][0].spacing) == len(panels):
             # the meshes had the right number of curves: the line is theirs, as in a sweep
             panels = ()
         else:
-            line = exact, finished(body, Curves.of(rows_of(d)[None], [exact]), 0).arcs
-    nodes, arcs = line
-    curves = [_curve(body, d, nodes, arcs, k, n_points) for k in range(len(nodes.spacing))]
-    for curve, exact_curve in zip(curves, panels, strict=False):
-        # the nodes of a line that turns this fast are too far apart to go through
-        vars(curve)["panels"] = exact_curve
+            take(np.zeros(1, np.int64), [exact])
+    nodes, arcs = lines[-1][0], lines[-1][1].arcs
+    exact_curves = panels or (None,) * len(nodes.spacing)
+    curves = [_curve(body, d, nodes, arcs, k, n_points, of) for k, of in enumerate(exact_curves)]
     return ShadowLine(body, incident, tuple(curves), distance, nodes)
 
 
@@ -257,19 +265,12 @@ def _piecewise_line(body: Surface, source: Incident, n_points: int) -> ShadowLin
     if speed_of(body) is not None:
         raise InvalidInputError(f"{brief(body)} has creases and a speed; give a body with one or the other")
     curves, on_edges, at_tips, edge_on = piecewise_curves(body, direction, n_points)
-    parts = [curve.line_nodes() for curve in curves]
-    nodes = LineNodes(
-        points=np.concatenate([np.zeros((0, 3)), *(part.points for part in parts)]),
-        tangents=np.concatenate([np.zeros((0, 3)), *(part.tangents for part in parts)]),
-        curvature=np.concatenate([np.zeros(0), *(part.curvature for part in parts)]),
-        starts=np.cumsum([0, *(len(part.curvature) for part in parts)]).astype(np.int64),
-        spacing=np.concatenate([np.zeros(0), *(part.spacing for part in parts)]),
-        error=max((part.error for part in parts), default=0.0),
-    )
-    return ShadowLine(body, source, curves, float("inf"), nodes, on_edges, at_tips, edge_on)
+    return ShadowLine(body, source, curves, float("inf"), nodes_of(curves), on_edges, at_tips, edge_on)
 
 
-def _curve(body: Surface, wave: FloatArray, nodes: LineNodes, arcs: Arcs, number: int, n_points: int) -> ShadowCurve:
+def _curve(
+    body: Surface, wave: FloatArray, nodes: LineNodes, arcs: Arcs, number: int, n_points: int, panels: PanelCurve | None
+) -> ShadowCurve:
     first, last = nodes.starts[number : number + 2]
     own = nodes.points[first:last]
     spacing = float(nodes.spacing[number])
@@ -296,6 +297,7 @@ def _curve(body: Surface, wave: FloatArray, nodes: LineNodes, arcs: Arcs, number
         curvature=curvature,
         arcs=tuple((start, end, STATUSES[code]) for (start, end), code in zip(ends.tolist(), codes, strict=True)),
         nodes=own,
+        panels=panels,
     )
 
 
@@ -303,3 +305,152 @@ def shares_of(line: ShadowLine) -> dict[str, float]:
     """Shares of a line's length by state, as a sweep adds them."""
     shares = finished(line.body, line._together, 0).shares[0]
     return dict(zip(line.fractions, shares.tolist(), strict=True))
+
+
+LEAST = 8
+"""Fewest incidences worth a thread."""
+TOGETHER = 64
+"""Most incidences at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShadowLines(Rows):
+    """Shadow lines of n incidences.
+
+    Attributes
+    ----------
+    directions : (n, 3)
+    status : (n,) of int8
+        Codes of `creeping.shadow.status.INCIDENCE_STATUSES`.
+    curves, length, error, attached, occluded, concave, singular_distance : (n,)
+        Closed curves, their length, L, its estimated relative error, shares of the length, and least |n.d| at a
+        critical point with K = 0.
+    launch : LaunchPoints
+    """
+
+    directions: FloatArray
+    status: np.ndarray[Any, np.dtype[np.int8]]
+    curves: FloatArray
+    length: FloatArray
+    error: FloatArray
+    attached: FloatArray
+    occluded: FloatArray
+    concave: FloatArray
+    singular_distance: FloatArray
+    launch: LaunchPoints
+
+    def of(self, rows: IntArray) -> ShadowLines:
+        """Those of some incidences."""
+        parts: dict[str, Any] = {one.name: getattr(self, one.name) for one in fields(self)}
+        return ShadowLines(**{name: part.of(rows) if name == "launch" else part[rows] for name, part in parts.items()})
+
+
+def shadow_lines(body: Surface, directions: FloatArray, n_rays: int, *, every: bool = False) -> ShadowLines:
+    """Shadow lines of unit directions.
+
+    Parameters
+    ----------
+    body : Surface
+    directions : (n, 3)
+    n_rays : int
+        Launch points of each, shared among the attached arcs by length and evenly spaced on each.
+    every : bool
+        Launch points on the whole line instead.
+
+    Returns
+    -------
+    ShadowLines
+
+    Raises
+    ------
+    SurfaceError
+        If F = 0 has no closed triangulation in its bounds.
+    """
+    if is_piecewise(body):
+        return _one_by_one(body, np.asarray(directions, dtype=float), n_rays, every)
+    directions = np.ascontiguousarray(directions, dtype=float)
+    waves, numbers = rows_of(directions), np.full((len(directions), 6), np.nan)
+    launch = LaunchPoints.blank(directions, n_rays)
+
+    def take(rows: IntArray, nodes: Sequence[LineNodes]) -> BoolArray:
+        """Fill in what is known of some lines; whether it is certain (rows,)."""
+        curves = Curves.of(waves[rows], nodes)
+        found = finished(body, curves, n_rays, every=every)
+        numbers[rows, 0], numbers[rows, 1], numbers[rows, 3:] = curves.counts, curves.lengths, found.shares
+        numbers[rows, 2] = [one.error for one in nodes]
+        launch.put(rows, found.launch)
+        return found.certain
+
+    status, v = _on_meshes(body, waves, take)
+    for row in np.flatnonzero(status == FOLLOWED):
+        numbers[row] = np.nan
+        launch.put(np.array([row]), LaunchPoints.blank(directions[[row]], n_rays))
+        try:
+            nodes, _, v[row] = followed(body, directions[row], prepared(body).coarsest)
+        except SingularIncidenceError as refused:
+            status[row], v[row] = SINGULAR, float(getattr(refused, "distance", 0.0))
+            continue
+        take(np.array([row]), [nodes])
+    curves, length, error, attached, occluded, concave = numbers.T
+    return ShadowLines(directions, status, curves, length, error, attached, occluded, concave, v, launch)
+
+
+def _on_meshes(
+    body: Surface, waves: FloatArray, take: Callable[[IntArray, Sequence[LineNodes]], BoolArray]
+) -> tuple[np.ndarray[Any, np.dtype[np.int8]], FloatArray]:
+    """Seek the lines of waves (n, 4), each on the coarsest mesh that is certain of it: their codes (n,), and v (n,).
+
+    ``take`` is given the rows (m,) of lines and their nodes on each mesh, and says whether they are certain (m,).
+    """
+    n, meshes, v = len(waves), prepared(body), critical_distances(body, waves)
+    status, certain = np.full(n, SINGULAR, np.int8), np.zeros(n, dtype=bool)
+    rows = np.flatnonzero(v >= FORBIDDEN)
+    for tier in range(LineMeshes.count):
+        if not len(rows):
+            break
+        meshes.packed(tier)
+
+        def run(part: slice, rows: IntArray = rows, tier: int = tier) -> None:
+            nodes, sure = traced(body, waves[rows[part]], tier)
+            there = np.flatnonzero([one is not None for one in nodes])
+            certain[rows[part]] = False
+            if len(there):
+                mine = rows[part][there]
+                certain[mine] = sure[there] & take(mine, [one for one in nodes if one is not None])
+
+        in_threads(run, len(rows), least=LEAST, multiple=1, most=TOGETHER)
+        onward, status[rows] = judged(v[rows], certain[rows], meshes.turn(tier), tier)
+        rows = rows[onward]
+    return status, v
+
+
+def lines_together(
+    directions: FloatArray, lines: Sequence[ShadowLine | None], n_rays: int, *, every: bool = False
+) -> ShadowLines:
+    """Lines of unit directions (n, 3) that were found one by one, None where one crosses itself; as `shadow_lines`."""
+    n = len(directions)
+    numbers, status = np.full((n, 6), np.nan), np.full(n, SINGULAR, np.int8)
+    near, launches = np.zeros(n), []
+    for row, (direction, line) in enumerate(zip(directions, lines, strict=True)):
+        if line is None:
+            launches.append(launched_from((), [], direction, n_rays))
+            continue
+        shares = line.fractions.values()
+        numbers[row], status[row] = (len(line.curves), line.length, line.nodes.error, *shares), OK
+        near[row] = line.singular_distance
+        launches.append(line.launch_points(n_rays, "all" if every else "attached"))
+    launched = LaunchPoints.joined([LaunchPoints.blank(directions[:0], n_rays), *launches])
+    curves, length, error, attached, occluded, concave = numbers.T
+    launched = replace(launched, waves=directions)
+    return ShadowLines(directions, status, curves, length, error, attached, occluded, concave, near, launched)
+
+
+def _one_by_one(body: Surface, directions: FloatArray, n_rays: int, every: bool) -> ShadowLines:
+    """Lines of a body with creases, each by itself."""
+    lines: list[ShadowLine | None] = []
+    for direction in directions:
+        try:
+            lines.append(shadow_line(body, direction, n_points=16))
+        except SingularIncidenceError:
+            lines.append(None)
+    return lines_together(directions, lines, n_rays, every=every)

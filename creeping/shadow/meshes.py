@@ -1,11 +1,13 @@
-"""What a body is prepared with for shadow lines at sweep speed: meshes, and its singular directions.
+"""Shadow lines as equally spaced nodes on meshes, and what a body is prepared with for them.
+
+Where no mesh is certain, or next to a singular direction, a line is followed with its topology proven (`refinement`).
 
 The gradient of n.d along the body is S d with S the shape operator. On n.d = 0 it vanishes only where K = 0 and d is
 the null direction a of S there: those directions are singular, and form curves on the sphere. They bound the regions
 in which the number of curves of the line is constant; to first order v = |n.d| at a critical point is the angle to
 them.
 
-Sources: Derivations, R11.
+Sources: Derivations, R6, R8 and R11.
 """
 
 from functools import cached_property
@@ -14,11 +16,17 @@ from weakref import ref
 
 import numpy as np
 
-from creeping._typing import Any, FloatArray, IntArray
-from creeping.geometry.curvature import gaussian_curvature
-from creeping.geometry.surface import Surface, normal, project
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
+from creeping.geometry.curvature import gaussian_curvature, parabolic_crossings
+from creeping.geometry.evaluators import evaluators
+from creeping.geometry.incident import rows_of
+from creeping.geometry.memo import memo
+from creeping.geometry.surface import Surface, normal, project, size
 from creeping.geometry.triangulation import Triangulation, triangulate
+from creeping.kernels.threads import in_slices
+from creeping.shadow.curves import LineNodes
 from creeping.shadow.refinement import halved
+from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, OK
 
 TIERS = ((2_500, 512), (10_000, 2048), (40_000, 4096))
 """Vertices of the meshes, and nodes of a line on them."""
@@ -128,34 +136,89 @@ def singular_segments(body: Surface, mesh: Triangulation) -> FloatArray:
     K = gaussian_curvature(body, mesh.vertices)
     t, k = np.nonzero((K[mesh.triangles] > 0) != (K[np.roll(mesh.triangles, -1, axis=1)] > 0))
     first, last = mesh.triangles[t, k], mesh.triangles[t, (k + 1) % 3]
-    points = _parabolic(body, mesh.vertices[first], mesh.vertices[last], K[first] > 0)
-    n, a = normal(body, points), _null_direction(body, points)
+    points, n, a, _ = parabolic_crossings(body, mesh.vertices[first], mesh.vertices[last], K[first], K[last])
     # two edges of a triangle are crossed; they follow each other in t
     n, a = n.reshape(-1, 2, 3), a.reshape(-1, 2, 3)
     a[:, 1] *= np.where(np.sum(a[:, 0] * a[:, 1], axis=-1) < 0, -1.0, 1.0)[:, None]
     return np.ascontiguousarray(np.concatenate([n, np.cross(n, a), points.reshape(-1, 2, 3)], axis=-1))
 
 
-def _parabolic(body: Surface, low: FloatArray, high: FloatArray, positive: Any) -> FloatArray:
-    """Points with K = 0 between points of either sign, by bisection on the body: (m, 3) x 2 -> (m, 3)."""
-    middle = low
-    for _ in range(40):
-        middle = project(body, 0.5 * (low + high))
-        same = (gaussian_curvature(body, middle) > 0) == positive
-        low = np.where(same[:, None], middle, low)
-        high = np.where(same[:, None], high, middle)
-    return middle
+def prepared(body: Surface) -> LineMeshes:
+    """Meshes of a body, made once."""
+    return memo(body, "line meshes", lambda: LineMeshes(body))
 
 
-def _null_direction(body: Surface, points: FloatArray) -> FloatArray:
-    """Unit tangents with the least |kappa|: (m, 3) -> (m, 3)."""
-    g, H = body.gradient(points), body.hessian(points)
-    norm = np.linalg.norm(g, axis=-1)
-    n = g / norm[:, None]
-    e = np.cross(n, np.eye(3)[np.argmin(np.abs(n), axis=1)])
-    e /= np.linalg.norm(e, axis=1, keepdims=True)
-    basis = np.stack([e, np.cross(n, e)], axis=1)
-    values, vectors = np.linalg.eigh(basis @ H @ np.swapaxes(basis, 1, 2) / norm[:, None, None])
-    least = np.argmin(np.abs(values), axis=1)
-    chosen = np.take_along_axis(vectors, least[:, None, None], axis=2)[..., 0]
-    return np.asarray(np.einsum("mk,mki->mi", chosen, basis))
+def critical_distances(body: Surface, waves: FloatArray) -> FloatArray:
+    """v, least |n.q|/|q| at critical points of n.q with K = 0, inf without one: (n, 3 or 4) -> (n,).
+
+    Of a point source within one body size no more than its height in body sizes: there its line is a small loop.
+    """
+    rows, ends = rows_of(waves), prepared(body).critical.reshape(-1, 9)
+    n, b, x = (np.ascontiguousarray(ends[:, k : k + 3]) for k in (0, 3, 6))
+    least = np.full(len(rows), np.inf)
+
+    def run(part: slice) -> None:
+        for row in range(part.start, part.stop):
+            d, w = rows[row, :3], rows[row, 3]
+            q = d + w * x if w else np.broadcast_to(d, x.shape)
+            # where q comes to be along the null direction between two ends
+            along = (np.sum(b * q, axis=1) if w else b @ d).reshape(-1, 2)
+            crossed = np.repeat((along[:, 0] > 0) != (along[:, 1] > 0), 2)
+            if crossed.any():
+                value = np.sum(n[crossed] * q[crossed], axis=1) / np.linalg.norm(q[crossed], axis=1)
+                (first, last), (low, high) = along[crossed[::2]].T, value.reshape(-1, 2).T
+                least[row] = np.min(np.abs(low + first / (first - last) * (high - low)))
+
+    in_slices(run, len(rows), multiple=1)
+    for row in np.flatnonzero(rows[:, 3]):
+        height = clearance(body, -rows[row, :3] / rows[row, 3])
+        if height < size(body):
+            least[row] = min(least[row], height / size(body))
+    return least
+
+
+def clearance(body: Surface, point: FloatArray) -> float:
+    """Distance of a point (3,) from the body, L, negative inside; far away, of points 0.04 body sizes apart."""
+    vertices = prepared(body).coarsest.vertices
+    distances = np.linalg.norm(vertices - point, axis=1)
+    height, near = float(np.min(distances)), vertices[[np.argmin(distances)]]
+    for _ in range(16 if height < 0.3 * size(body) else 0):
+        n, away = normal(body, near), point - near
+        # by parts of the way: a foot next to a centre of curvature would be passed
+        near = project(body, near + 0.5 * (away - np.sum(away * n, axis=1, keepdims=True) * n))
+        height = min(height, float(np.linalg.norm(near - point)))
+    return height if float(body.level(point[None])[0]) > 0 else -height
+
+
+def judged(v: FloatArray, certain: BoolArray, turn: float, tier: int) -> tuple[BoolArray, IntArray]:
+    """Which lines go on to the next mesh, and the codes of the others.
+
+    A line is certain if every step was certain of it and the direction is so far from a singular one, v > e^2 with e
+    the mean angle between neighbouring normals, that the mesh cannot have missed a small loop.
+    """
+    far = v > turn * turn
+    last = tier >= LineMeshes.count - 2
+    code = np.where(certain, np.where(far, OK, NEAR_SINGULAR), FOLLOWED)
+    onward = ~certain | (~far & (not last))
+    return (onward if tier < LineMeshes.count - 1 else np.zeros_like(onward)), code
+
+
+def traced(body: Surface, waves: FloatArray, tier: int) -> tuple[list[LineNodes | None], BoolArray]:
+    """Nodes of the lines of waves (n, 4) on a mesh, None where there is no line, and whether they are certain (n,)."""
+    from creeping.shadow.kernels.trace import CURVES, LEAST_NODES, lines_on_mesh
+
+    mesh, n = prepared(body).packed(tier), len(waves)
+    most = mesh[-1] + (LEAST_NODES + 8) * CURVES
+    x, T, kappa = np.empty((n, most, 3)), np.empty((n, most, 3)), np.empty((n, most))
+    starts, spacing = np.empty((n, CURVES + 1), np.int64), np.empty((n, CURVES))
+    found, certain, error = np.zeros(n, np.int64), np.zeros(n, dtype=bool), np.zeros(n)
+    with evaluators(body) as parts:
+        extent = float(np.max(np.ptp(body.bounds, axis=0)))
+        lines_on_mesh(*parts[:2], extent, mesh, waves, x, T, kappa, starts, spacing, found, certain, error)
+    nodes: list[LineNodes | None] = [None] * n
+    for row in np.flatnonzero(found):
+        curves = found[row]
+        own = slice(starts[row, curves])
+        parts_of = x[row, own], T[row, own], kappa[row, own], starts[row, : curves + 1], spacing[row, :curves]
+        nodes[row] = LineNodes(*parts_of, float(error[row]))
+    return nodes, certain

@@ -23,6 +23,7 @@ from creeping._typing import BoolArray, FloatArray
 from creeping.errors import SingularIncidenceError
 from creeping.geometry.incident import spherical, travel
 from creeping.geometry.surface import Surface, jet, size
+from creeping.shadow.curves import moved_onto_lines, tangents_at
 
 ORDER = 16
 """Gauss points of a panel."""
@@ -35,15 +36,10 @@ _U, _WEIGHTS = legendre.leggauss(ORDER)
 _TO_COEFFICIENTS = (legendre.legvander(_U, ORDER - 1) * _WEIGHTS[:, None] * (np.arange(ORDER) + 0.5)).T
 
 
-def newton_step(
-    body: Surface, wave: FloatArray, points: FloatArray, axis: FloatArray | None = None
-) -> tuple[FloatArray, FloatArray]:
+def newton_step(body: Surface, wave: FloatArray, points: FloatArray, axis: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Newton step for {F = 0, G = 0}, G = grad F.q - w F, at right angles to an axis, and the tangent: (n, 3), (n, 3).
 
-    ``wave`` is (d, w), or d of a plane wave, (3,) or (4,) or one for each point.
-
-    Without an axis it is the tangent, and the step is that of least norm. grad G = Hq, and inverse rows of
-    (grad F, Hq, axis) are cross products over the determinant axis.(grad F x Hq).
+    grad G = Hq, and inverse rows of (grad F, Hq, axis) are cross products over the determinant axis.(grad F x Hq).
     """
     F, gradient, hessian = jet(body, points)
     q = travel(wave, points)
@@ -52,26 +48,11 @@ def newton_step(
     if spherical(wave):
         G = G - wave[..., 3] * F
     W = _crossed(gradient, Hq)
-    if axis is None:
-        axis = W
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         step = -(F[..., None] * _crossed(Hq, axis) + G[..., None] * _crossed(axis, gradient))
         step /= np.sum(W * axis, axis=-1, keepdims=True)
         tangent = W / np.linalg.norm(W, axis=-1, keepdims=True)
     return step, tangent
-
-
-def onto_line(body: Surface, wave: FloatArray, points: FloatArray, *, reach: float, iterations: int = 4) -> FloatArray:
-    """Points of {F = 0, grad F.q = 0} by steps of least norm, each at most ``reach``: (n, 3) -> (n, 3)."""
-    points = np.array(points, dtype=float)
-    least = np.finfo(float).eps * np.max(np.abs(points), initial=0.0)
-    for _ in range(iterations):
-        step, _ = newton_step(body, wave, points)
-        points += _limited(step, reach)
-        # what is left is rounding
-        if np.all(np.abs(step) <= least):
-            break
-    return points
 
 
 def _crossed(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -139,7 +120,7 @@ class PanelCurve:
             if np.all(np.abs(step) < 1e-15):
                 break
         points = np.einsum("mk,mkc->mc", legendre.legvander(u, ORDER - 1), self.shape[panel])
-        return onto_line(self.body, self.wave, points, reach=1e-6 * size(self.body), iterations=2)
+        return moved_onto_lines(self.body, self.wave, points, reach=1e-6 * size(self.body), steps=2).points
 
 
 def fit_panels(
@@ -176,7 +157,7 @@ def fit_panels(
     """
     if closed:
         nodes = _forward_nodes(body, wave, nodes, spacing)
-    _, tangents = newton_step(body, wave, nodes)
+    tangents = tangents_at(body, wave, nodes)
     count = len(nodes)
     last = count if closed else count - 1
     chords = np.linalg.norm(np.roll(nodes, -1, axis=0) - nodes, axis=1)[:last]
@@ -223,7 +204,7 @@ def _between(low: float, high: float) -> float:
 
 def _forward_nodes(body: Surface, wave: FloatArray, nodes: FloatArray, spacing: FloatArray) -> FloatArray:
     """Drop nodes that lie behind, or less than a quarter of a mesh edge before, the last one kept."""
-    _, tangents = newton_step(body, wave, nodes)
+    tangents = tangents_at(body, wave, nodes)
     kept = [0]
     for k in range(1, len(nodes)):
         if (nodes[k] - nodes[kept[-1]]) @ tangents[kept[-1]] > 0.25 * min(spacing[k], spacing[kept[-1]]):
@@ -301,6 +282,5 @@ def _middle(
     """Point of the curve near the middle of the cubic from a to b, with its tangent."""
     with np.errstate(divide="ignore", invalid="ignore"):
         guess = _hermite(a[None], Ta[None], b[None], Tb[None], np.zeros(1))[0]
-    point = onto_line(body, wave, guess, reach=0.3 * float(np.linalg.norm(b - a)), iterations=8)
-    _, tangent = newton_step(body, wave, point)
-    return point[0], tangent[0]
+    found = moved_onto_lines(body, wave, guess, reach=0.3 * float(np.linalg.norm(b - a)), steps=8)
+    return found.points[0], found.tangents[0]

@@ -15,24 +15,21 @@ from typing import NamedTuple
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray
+from creeping.geodesics.piece_walk import REACH
 from creeping.geometry.piecewise import Tiles, nearest_crease, piece_ahead, tips_of
 from creeping.geometry.surface import size
-from creeping.shadow.panels import newton_step, onto_line
+from creeping.shadow.curves import Moved, moved_onto_lines, tangents_at
 
 STEP, LEAST_STEP = 0.04, 1e-6
 """Longest and shortest step along a curve, in body sizes."""
 TURN = 0.25
 """Largest angle between tangents a step apart, radians."""
-REACH = 1e-3
-"""Distance from a tip, in body sizes, within which nothing is followed: curvatures go like its inverse there."""
 ASTRAY = 1.5
 """Distance from the tiles of a piece, in their longest side, beyond which F = 0 is another sheet, as fits may have."""
 ALIKE = 0.1
 """Distance from a curve, in its steps, up to which a seed lies on it: chords leave it by a third of that."""
 EDGE_ON = 1e-7
 """|n.d| on a whole piece up to which it lies edge-on and has no line of its own."""
-HALVINGS, SHORT = 60, 1e-3
-"""Halvings of the way to where a curve leaves its piece, and the distance, in body sizes, below which two steps do."""
 MOST = 20_000
 """Nodes of a curve at most."""
 CLOSE = 1e-11
@@ -80,20 +77,19 @@ def curves_on(
     if not walk.broken:
         return found, 0.0
     known = sum(float(np.sum(np.linalg.norm(np.diff(curve.nodes, axis=0), axis=1))) for curve in found)
-    return found, max(contour_length(tiles, number, direction) - known, 0.0)
+    ends = contour(tiles, number, direction)
+    return found, max(float(np.sum(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))) - known, 0.0)
 
 
-def contour_length(tiles: Tiles, number: int, direction: FloatArray) -> float:
-    """Length of n.d = 0 on the tiles of a piece, n.d taken as linear on each, L."""
+def contour(tiles: Tiles, number: int, direction: FloatArray) -> FloatArray:
+    """Where n.d = 0, n.d taken as linear on each tile of a piece, crosses their sides: both ends on each (m, 2, 3)."""
     mine = tiles.pieces == number
     corners, s = tiles.corners[mine], tiles.normals[mine] @ direction
     after, ahead = np.roll(corners, -1, axis=1), np.roll(s, -1, axis=1)
     crossed = (s > 0) != (ahead > 0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        points = corners + (s / (s - ahead))[..., None] * (after - corners)
+    share = s[crossed] / (s[crossed] - ahead[crossed])
     # two sides of a triangle are crossed, or none
-    pairs = points[crossed].reshape(-1, 2, 3)
-    return float(np.sum(np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=1)))
+    return np.asarray(corners[crossed] + share[:, None] * (after[crossed] - corners[crossed])).reshape(-1, 2, 3)
 
 
 def edge_on(tiles: Tiles, number: int, direction: FloatArray) -> bool:
@@ -134,27 +130,16 @@ class _Walk:
         """Points of the line on the piece, at least one on each curve that a triangle's side crosses."""
         mine = tiles.pieces == self.number
         corners, s = tiles.corners[mine], tiles.normals[mine] @ self.direction
-        after, ahead = np.roll(corners, -1, axis=1), np.roll(s, -1, axis=1)
-        mixed = (s > 0) != (ahead > 0)
-        share = s[mixed] / (s[mixed] - ahead[mixed])
-        points = corners[mixed] + share[:, None] * (after[mixed] - corners[mixed])
-        points = np.concatenate([points, corners[np.abs(s) < EDGE_ON]])
-        if not len(points):
-            return points
-        edge = float(np.max(np.linalg.norm(after - corners, axis=-1)))
-        with np.errstate(all="ignore"):
-            x = onto_line(self.piece, self.direction, points, reach=0.5 * edge, iterations=12)
-        x = x[np.all(np.isfinite(x), axis=1) & (np.linalg.norm(x - points, axis=1) < edge)]
-        x = x[self._solved(x)]
+        crossed = contour(tiles, self.number, self.direction).reshape(-1, 3)
+        points = np.concatenate([crossed, corners[np.abs(s) < EDGE_ON]])
+        edge = self._reach / ASTRAY
+        found = self._corrected(points, 0.5 * edge, 12)
+        x = found.points[self._solved(found) & (np.linalg.norm(found.points - points, axis=1) < edge)]
         kept: FloatArray = x[self.inside(x) & ~(self._to_tip(x) <= REACH * self.size)]
         return kept
 
-    def _solved(self, x: FloatArray) -> BoolArray:
-        if not len(x):
-            return np.zeros(0, dtype=bool)
-        with np.errstate(all="ignore"):
-            step, _ = newton_step(self.piece, self.direction, x)
-        return np.asarray(np.linalg.norm(step, axis=1) < CLOSE * self.size)
+    def _solved(self, found: Moved) -> BoolArray:
+        return found.left < CLOSE * self.size
 
     def inside(self, x: FloatArray) -> BoolArray:
         """Whether points of the line are of this piece (n,), and not of a sheet of its F far from the body."""
@@ -168,7 +153,7 @@ class _Walk:
 
     def whole(self, seed: FloatArray) -> PieceCurve | None:
         """The curve through a seed; None where the seed has no tangent or the curve no length."""
-        T = self._tangent(seed)
+        T = tangents_at(self.piece, self.direction, seed[None])[0]
         if not np.all(np.isfinite(T)):
             return None
         ahead, closed, last, far = self._followed(seed, T, 1.0)
@@ -187,13 +172,8 @@ class _Walk:
                     nodes = np.delete(nodes, inner, axis=0)
         return PieceCurve(nodes, False, (first, last), (near, far))
 
-    def _tangent(self, x: FloatArray) -> FloatArray:
-        with np.errstate(all="ignore"):
-            return np.asarray(newton_step(self.piece, self.direction, x[None])[1][0])
-
-    def _corrected(self, guess: FloatArray, reach: float, iterations: int = 6) -> FloatArray:
-        with np.errstate(all="ignore"):
-            return onto_line(self.piece, self.direction, guess, reach=reach, iterations=iterations)
+    def _corrected(self, guess: FloatArray, reach: float, steps: int = 6) -> Moved:
+        return moved_onto_lines(self.piece, self.direction, guess, reach=reach, steps=steps)
 
     def _followed(self, start: FloatArray, T0: FloatArray, sign: float) -> tuple[FloatArray, bool, int, float]:
         """Nodes from the start along sign T, whether they come round, the crease they end at, and the gap to it."""
@@ -204,10 +184,10 @@ class _Walk:
             if tip <= REACH * self.size:
                 return np.array(nodes), False, *self._end(x, tip)
             h = min(h, STEP * self.size, max(0.5 * tip, 0.5 * REACH * self.size))
-            y = self._corrected((x + sign * h * T)[None], 0.3 * h)[0]
-            V = self._tangent(y)
+            found = self._corrected((x + sign * h * T)[None], 0.3 * h)
+            y, V = found.points[0], found.tangents[0]
             off = np.linalg.norm(y - x - sign * h * T)
-            if not (off < 0.3 * h and T @ V > np.cos(TURN) and self._solved(y[None])[0]):
+            if not (off < 0.3 * h and T @ V > np.cos(TURN) and self._solved(found)[0]):
                 h *= 0.5
                 if h < LEAST_STEP * self.size:
                     self.broken = True
@@ -219,7 +199,7 @@ class _Walk:
             if len(nodes) > 2 and 0 < home <= 1 and miss < ALIKE * h and T0 @ V > 0.8:
                 return np.array(nodes), True, -1, 0.0
             shares = np.array([0.25, 0.5, 0.75, 1.0])
-            out = ~self.inside(self._corrected(x + shares[:, None] * chord, 0.3 * h))
+            out = ~self.inside(self._corrected(x + shares[:, None] * chord, 0.3 * h).points)
             if out.any():
                 k = int(np.argmax(out))
                 end = self._bisected(x, chord, shares[k - 1] if k else 0.0, shares[k])
@@ -232,13 +212,13 @@ class _Walk:
     def _bisected(self, x: FloatArray, chord: FloatArray, low: float, high: float) -> FloatArray:
         """Last point of the piece between shares of a chord of the curve."""
         long = float(np.linalg.norm(chord))
-        best, other = self._corrected(x + np.array([[low], [high]]) * chord, 0.3 * long)
-        for _ in range(HALVINGS):
+        best, other = self._corrected(x + np.array([[low], [high]]) * chord, 0.3 * long).points
+        for _ in range(60):
             gap = float(np.linalg.norm(other - best))
             if gap <= 1e-14 * self.size:
                 break
             # the middle of two points of the curve is off it by the square of their distance
-            y = self._corrected(0.5 * (best + other)[None], 0.3 * gap, 2 if gap < SHORT * self.size else 6)
+            y = self._corrected(0.5 * (best + other)[None], 0.3 * gap).points
             if self.inside(y)[0]:
                 best = y[0]
             else:

@@ -1,26 +1,38 @@
-"""Shadow lines of bodies with creases: the curves of each piece, finished, and where they go on beyond their ends.
+"""Shadow lines of bodies with creases: the curves of each piece, where they go on beyond their ends, and edges.
 
 Each curve is that of a smooth F_i (`creeping.shadow.piece_curves`), in panels exact to rounding. Whether the wave comes
 to a point is asked of the whole body, at points of the curve and, by bisection, where two neighbours differ. At joints
 the curves of two pieces meet: there one goes on as the other.
 
+Parts of a body's creases belong to the line, too, but launch no creeping ray. Seen along d, the outline runs along a
+convex edge where it is lit on one side only,
+
+    (n_i.d < 0) != (n_j.d < 0),
+
+and a piece that lies edge-on, n.d = 0, counts as dark. Between the points of a crease the edge is the cubic with their
+tangents e = n_i x n_j/|.|.
+
 Sources: Derivations, R6 and R10.
 """
 
 from dataclasses import replace
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 
-from creeping._typing import Any, FloatArray, IntArray
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import SingularIncidenceError
+from creeping.geodesics.attenuation import gauss_rule
 from creeping.geometry.piecewise import SMOOTH, pieces_of, tiles_of
 from creeping.geometry.surface import size
 from creeping.shadow.arcs import shared_out
 from creeping.shadow.attachment import Arc, LaunchPoints, occluded
 from creeping.shadow.curve import ShadowCurve
-from creeping.shadow.edges import EdgePart, parts_on_edges, unit_normals
-from creeping.shadow.panels import PanelCurve, fit_panels, newton_step
-from creeping.shadow.piece_curves import PieceCurve, curves_on, edge_on
+from creeping.shadow.curves import moved_onto_lines
+from creeping.shadow.panels import LENGTH_TOLERANCE, PanelCurve, fit_panels
+from creeping.shadow.piece_curves import EDGE_ON, PieceCurve, curves_on, edge_on
 from creeping.shadow.status import ATTACHED, CONCAVE, NO_RAY, OCCLUDED, STATUSES
 
 TILE = 0.05
@@ -29,21 +41,15 @@ LOOKED_AT = 193
 """Points of a curve whose states are asked for."""
 OUTWARD = 1e-9
 """Distance from the body, in its sizes, at which that is asked: along a straight generator F is 0 up to rounding."""
-SHORTEST = 1e-9
-"""Length, in body sizes, of a curve below which there is none."""
 MEET = 1e-7
-"""Distance of the ends of two curves, in body sizes, up to which they meet."""
+"""Distance of the ends of two curves, in body sizes, up to which they meet, and least length of a curve."""
 MOST_PANELS = 1000
 """Of a curve: one that takes more, as along a generator that the wave goes along, is lost, and takes minutes."""
-DOUBLINGS = 5
-"""Of the distance from a tip at which a curve ends, while its panels cannot be made."""
-EXACT = 1e-12
-"""Relative error of a length: panels are exact to rounding."""
-
-Found = tuple[tuple[ShadowCurve, ...], tuple[EdgePart, ...], float, tuple[int, ...]]
 
 
-def piecewise_curves(body: Any, direction: FloatArray, n_points: int) -> Found:
+def piecewise_curves(
+    body: Any, direction: FloatArray, n_points: int
+) -> tuple[tuple[ShadowCurve, ...], tuple["EdgePart", ...], float, tuple[int, ...]]:
     """Curves of the line of a unit direction, the longest first.
 
     Returns
@@ -75,7 +81,7 @@ def piecewise_curves(body: Any, direction: FloatArray, n_points: int) -> Found:
                 # it turns within rounding of a crossing somewhere: all of it is lost
                 gaps += float(np.sum(np.linalg.norm(np.diff(found.nodes, axis=0), axis=1)))
                 continue
-            if curve.length > SHORTEST * size(body):
+            if curve.length > MEET * size(body):
                 curves.append(curve)
                 gaps += sum(found.gaps)
     curves.sort(key=lambda curve: -curve.length)
@@ -86,7 +92,7 @@ def _as_far_as_known(
     body: Any, piece: Any, number: int, direction: FloatArray, found: PieceCurve, n_points: int
 ) -> tuple[ShadowCurve, PieceCurve]:
     """The curve in panels; where these fail next to a tip, as the slope of F fades into rounding, ended farther off."""
-    for _ in range(DOUBLINGS):
+    for _ in range(5):
         try:
             return _finished(body, piece, number, direction, found, n_points), found
         except SingularIncidenceError:
@@ -116,8 +122,7 @@ def _finished(
     chords = np.linalg.norm(np.roll(found.nodes, -1, axis=0) - found.nodes, axis=1)
     panels = fit_panels(piece, direction, found.nodes, chords, closed=found.closed, most=MOST_PANELS)
     arclength = np.linspace(0.0, panels.length, n_points, endpoint=not found.closed)
-    points = panels.at(arclength)
-    _, tangents = newton_step(piece, direction, points)
+    points, tangents, curvature, _ = moved_onto_lines(piece, direction, panels.at(arclength), reach=0.0, steps=0)
     arcs = _arcs(body, piece, direction, panels)
     curve = ShadowCurve(
         body=body,
@@ -127,29 +132,23 @@ def _finished(
         tangents=tangents,
         arclength=arclength,
         length=panels.length,
-        error=EXACT,
+        error=LENGTH_TOLERANCE,
         status=np.full(n_points, STATUSES[ATTACHED]),
-        curvature=_bent(piece, direction, points),
+        curvature=curvature,
         arcs=arcs,
         nodes=points,
         closed=found.closed,
         piece=number,
         creases=found.creases,
+        panels=panels,
     )
-    vars(curve)["panels"] = panels
     curve.status[:] = np.array(STATUSES)[curve.state_at(arclength)]
     return curve
 
 
-def _bent(piece: Any, direction: FloatArray, points: FloatArray) -> FloatArray:
-    """kappa_n(d) at points (n,), 1/L."""
-    bent = np.einsum("nij,i,j->n", piece.hessian(points), direction, direction)
-    return np.asarray(bent / np.linalg.norm(piece.gradient(points), axis=1))
-
-
 def _states(body: Any, piece: Any, direction: FloatArray, points: FloatArray) -> IntArray:
     """Codes of points of a curve (n,)."""
-    convex = _bent(piece, direction, points) > 0
+    convex = moved_onto_lines(piece, direction, points, reach=0.0, steps=0).curvature > 0
     hidden = occluded(body, points + OUTWARD * size(body) * unit_normals(piece, points), direction)
     return np.where(convex, np.where(hidden, OCCLUDED, ATTACHED), CONCAVE)
 
@@ -202,9 +201,7 @@ def _joined(body: Any, curves: list[ShadowCurve]) -> tuple[ShadowCurve, ...]:
         if curve.closed:
             out.append(curve)
             continue
-        one = replace(curve, goes_on=(goes_on[number, 0], goes_on[number, 1]))
-        vars(one)["panels"] = curve.panels
-        out.append(one)
+        out.append(replace(curve, goes_on=(goes_on[number, 0], goes_on[number, 1])))
     return tuple(out)
 
 
@@ -229,3 +226,121 @@ def launched_from(curves: tuple[ShadowCurve, ...], arcs: list[Arc], direction: F
         first += count
     columns: tuple[Any, ...] = (points, arclength, curve_index, arc_index, spacing, closed, state)
     return LaunchPoints(direction[None], *(column[None] for column in columns))
+
+
+PROBE = 1e-4
+"""Distance from an edge, in body sizes, at which F tells a convex one from a concave one."""
+
+
+class EdgePart(NamedTuple):
+    """Part of an edge that the shadow line runs along.
+
+    Attributes
+    ----------
+    crease : int
+        Number of the crease.
+    points : (n, 3), L
+    length : float, L
+    """
+
+    crease: int
+    points: FloatArray
+    length: float
+
+
+def parts_on_edges(body: Any, pieces: tuple[Any, ...], direction: FloatArray) -> tuple[EdgePart, ...]:
+    """Parts of convex edges that are lit on one side only, of all edges in turn."""
+    found: list[EdgePart] = []
+    for number, crease in enumerate(body.creases):
+        if crease.kind != "edge":
+            continue
+        x = np.asarray(crease.points, dtype=float)
+        sides = [pieces[k] for k in crease.pieces]
+        n = [unit_normals(side, x) for side in sides]
+        runs = _runs(x, edge_tangents(x, *n), convex(body, x, *n), sides, direction)
+        found += [
+            EdgePart(number, np.concatenate([run[0][0][:1], *(p[0][1:] for p in run)]), float(sum(p[1] for p in run)))
+            for run in runs
+        ]
+    return tuple(found)
+
+
+def unit_normals(piece: Any, x: FloatArray) -> FloatArray:
+    """Normals of a piece (n, 3)."""
+    gradient = piece.gradient(x)
+    return np.asarray(gradient / np.linalg.norm(gradient, axis=1, keepdims=True))
+
+
+def edge_tangents(x: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:
+    """Unit tangents e of an edge along its points (n, 3), from the normals on either side."""
+    closed = len(x) > 3 and np.array_equal(x[0], x[-1])
+    ahead, behind = np.roll(x, -1, axis=0), np.roll(x, 1, axis=0)
+    if closed:
+        ahead[-1], behind[0] = x[1], x[-2]
+    else:
+        ahead[-1], behind[0] = x[-1], x[0]
+    chord = ahead - behind
+    chord /= np.linalg.norm(chord, axis=1, keepdims=True)
+    e = np.cross(first, second)
+    sine = np.linalg.norm(e, axis=1, keepdims=True)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        e = e / sine * np.sign(np.sum(e * chord, axis=1, keepdims=True))
+    # where the normals nearly agree, or the polyline is too coarse to say which way, the chord must do
+    return np.where((sine > 1e-6) & (np.sum(e * chord, axis=1, keepdims=True) > 0.5), e, chord)
+
+
+def convex(body: Any, x: FloatArray, first: FloatArray, second: FloatArray) -> BoolArray:
+    """Whether an edge is convex at its points (n,): F > 0 on both sides across the mean normal."""
+    across = first - second
+    across = PROBE * size(body) * across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
+    return np.asarray((body.level(x + across) > 0) & (body.level(x - across) > 0))
+
+
+def _runs(
+    x: FloatArray, e: FloatArray, is_convex: BoolArray, sides: list[Any], direction: FloatArray
+) -> list[list[tuple[FloatArray, float]]]:
+    """Runs of the parts of one edge on the line, each the ends (2, 3) and the length of parts one after the other."""
+    s = [unit_normals(side, x) @ direction + EDGE_ON for side in sides]
+    runs: list[list[tuple[FloatArray, float]]] = []
+    for k in np.flatnonzero(is_convex[:-1] & is_convex[1:]):
+        ends = x[k : k + 2], e[k : k + 2]
+        cuts = [_cut(*ends, side, direction) for side, v in zip(sides, s, strict=True) if (v[k] < 0) != (v[k + 1] < 0)]
+        shares = [0.0, *sorted(cuts), 1.0]
+        for low, high in pairwise(shares):
+            middle = _cubic(*ends, np.array([0.5 * (low + high)]))
+            one, two = (unit_normals(side, middle)[0] @ direction < -EDGE_ON for side in sides)
+            if one == two or not high > low:
+                continue
+            part = _cubic(*ends, np.array([low, high])), _length(*ends, low, high)
+            if runs and _meet(runs[-1][-1], part):
+                runs[-1].append(part)
+            else:
+                runs.append([part])
+    if len(runs) > 1 and _meet(runs[-1][-1], runs[0][0]):
+        runs[0] = runs.pop() + runs[0]
+    return runs
+
+
+def _meet(before: tuple[FloatArray, float], after: tuple[FloatArray, float]) -> bool:
+    return bool(np.linalg.norm(before[0][-1] - after[0][0]) <= 1e-9 * (before[1] + after[1]))
+
+
+def _cut(x: FloatArray, e: FloatArray, side: Any, direction: FloatArray) -> float:
+    """Share of a segment at which n.d of one side changes its sign."""
+    return float(brentq(lambda u: unit_normals(side, _cubic(x, e, np.array([u])))[0] @ direction + EDGE_ON, 0.0, 1.0))
+
+
+def _cubic(x: FloatArray, e: FloatArray, u: FloatArray) -> FloatArray:
+    """Points at shares u (n,) of the cubic between two points with unit tangents: (n, 3), L."""
+    h, v = float(np.linalg.norm(x[1] - x[0])), u[:, None]
+    at = (1 - v) ** 2 * (1 + 2 * v) * x[0] + v**2 * (3 - 2 * v) * x[1]
+    return np.asarray(at + h * v * (1 - v) * ((1 - v) * e[0] - v * e[1]))
+
+
+def _length(x: FloatArray, e: FloatArray, low: float, high: float) -> float:
+    """Length of the cubic from a share to another, L."""
+    points, weights = gauss_rule(5)
+    u = (low + (high - low) * points)[:, None]
+    chord, h = x[1] - x[0], float(np.linalg.norm(x[1] - x[0]))
+    slope = 6 * u * (1 - u) * chord + h * ((1 - u) * (1 - 3 * u) * e[0] + u * (3 * u - 2) * e[1])
+    return float((high - low) * np.sum(weights * np.linalg.norm(slope, axis=1)))

@@ -43,8 +43,7 @@ from creeping.rays.reach import early_length
 from creeping.rays.strips import Strip, strips_of
 from creeping.rays.tracer import RayTracer
 from creeping.rays.transport import Flow, carried
-from creeping.shadow.line import ShadowLine, shadow_line
-from creeping.shadow.many import ShadowLines, lines_together, shadow_lines
+from creeping.shadow.line import ShadowLine, ShadowLines, lines_together, shadow_line, shadow_lines
 from creeping.shadow.status import OK, SINGULAR
 from creeping.sweeping.request import CURVED, VALID, SweepRequest
 
@@ -222,7 +221,7 @@ class Sweeper:
         if not len(rows):
             return None
         if self._tracer is not None:
-            launched = lines.launch.of(rows)
+            launched = lines.launch[rows]
             for name, found in zip(
                 VALID, validities(self.body, launched, self._early, request.wavenumbers), strict=True
             ):
@@ -242,7 +241,7 @@ class Sweeper:
             fan = self._fan(directions[number])
             return fan.line, tuple(strip for strip in strips_of(fan) if len(strip.positions) > 1)
 
-        geometry = FarGeometry(self.flow, lines.launch.of(rows), tracer, observers, lines.attached[rows], forward)
+        geometry = FarGeometry(self.flow, lines.launch[rows], tracer, observers, lines.attached[rows], forward)
         cases, made, kinds = self._cases(), list[Parts](), len(request.problems)
         for case in cases:
             (_, wavenumber), (name, _, _) = case

@@ -19,9 +19,9 @@ from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.incident import rows_of
 from creeping.shadow.arcs import finished
 from creeping.shadow.curves import Curves
-from creeping.shadow.many import TOGETHER, shadow_lines
-from creeping.shadow.meshes import LineMeshes
-from creeping.shadow.nodes import FORBIDDEN, critical_distances, judged, prepared, traced
+from creeping.shadow.line import TOGETHER, shadow_lines
+from creeping.shadow.meshes import LineMeshes, critical_distances, judged, prepared, traced
+from creeping.shadow.refinement import FORBIDDEN
 from creeping.shadow.status import FOLLOWED, INCIDENCE_STATUSES, NEAR_SINGULAR, OK, SINGULAR
 from studies import tables
 from studies.cost.flow_cases import seconds_of, threads

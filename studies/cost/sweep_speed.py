@@ -16,7 +16,7 @@ import scatterers as sc
 from creeping._typing import Any, FloatArray
 from creeping.geometry.directions import fibonacci_directions, great_circle
 from creeping.phaseflow.tuning.request import tuned_direct
-from creeping.shadow.many import shadow_lines
+from creeping.shadow.line import shadow_lines
 from creeping.sweeping.request import sweep_request
 from creeping.sweeping.sweeper import Sweeper
 from studies import tables

@@ -7,7 +7,7 @@ import shared_bodies as sc
 import creeping as cr
 from creeping.field.waves.far_geometry import fold_error
 from creeping.geometry.quadrature import body_nodes
-from creeping.shadow.nodes import prepared
+from creeping.shadow.meshes import prepared
 
 D = np.array([0.85, 0.35, -0.39]) / np.linalg.norm([0.85, 0.35, -0.39])
 R = np.array([-0.8996, -0.2953, -0.3217]) / np.linalg.norm([0.8996, 0.2953, 0.3217])

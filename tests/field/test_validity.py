@@ -17,7 +17,7 @@ from creeping.field.validity_range import (
 )
 from creeping.geodesics.equations import sharpest_curvature
 from creeping.rays.reach import early_length
-from creeping.shadow.many import shadow_lines
+from creeping.shadow.line import shadow_lines
 from creeping.shadow.status import SINGULAR
 
 

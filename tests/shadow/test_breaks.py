@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from creeping.shadow.arcs import shared_out
-from creeping.shadow.breaks import breaks_of
+from creeping.shadow.arcs import breaks_of, shared_out
 from creeping.shadow.curves import Curves, LineNodes, interpolated
 from creeping.shadow.kernels.crossings import crossings
 

@@ -10,10 +10,9 @@ import creeping as cr
 from creeping.geometry.incident import rows_of
 from creeping.shadow.arcs import finished
 from creeping.shadow.curves import Curves
-from creeping.shadow.following import followed
-from creeping.shadow.many import shadow_lines
-from creeping.shadow.meshes import LineMeshes, neighbours_of
-from creeping.shadow.nodes import prepared
+from creeping.shadow.line import shadow_lines
+from creeping.shadow.meshes import LineMeshes, neighbours_of, prepared
+from creeping.shadow.refinement import followed
 from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, NO_RAY, OK, SINGULAR
 
 BODIES = {
@@ -38,7 +37,7 @@ def test_is_the_shadow_line_of_each_and_that_of_panels(name, rng):
         for status in STATUSES:
             assert getattr(lines, status)[row] == pytest.approx(line.fractions[status], abs=1e-14)
         np.testing.assert_array_equal(line.launch_points(64).points[0], lines.launch.points[row])
-        nodes, panels, distance = followed(body, line.direction)
+        nodes, panels, distance = followed(body, line.direction, prepared(body).coarsest)
         assert line.length == pytest.approx(sum(curve.length for curve in panels), rel=1e-10)
         shares = finished(body, Curves.of(rows_of(line.wave)[None], [nodes]), 0).shares[0]
         assert list(line.fractions.values()) == pytest.approx(list(shares), abs=1e-8)

@@ -8,7 +8,7 @@ from oracles.plain_sweep import PlainSweeper
 import creeping as cr
 from creeping.field.waves.far_geometry import FarGeometry
 from creeping.rays.tracer import RayTracer
-from creeping.shadow.many import shadow_lines
+from creeping.shadow.line import shadow_lines
 from creeping.sweeping.request import sweep_request
 from creeping.sweeping.sweeper import Sweeper
 from tests.reference import sphere

@@ -63,7 +63,7 @@ class PortBeams:
         x, p = lanes[..., 0:3], lanes[..., 3:6]
         b = np.cross(normal(body, x.reshape(-1, 3)), p.reshape(-1, 3)).reshape(x.shape)
         S = np.broadcast_to(self.step * np.arange(shape[1]), shape)
-        curvature, apart = lanes[..., lane.ACROSS], 2 * np.pi / count
+        curvature, apart = lanes[..., lane.LANE.across], 2 * np.pi / count
         self.beams = GaussianBeams(body, k, states[:, : shape[1]], b, curvature, S, logarithm, slope, apart)
         if ratio is not None:
             self._carry(ratio, b, p, turned_by(slope, k), waves.axes[number])
@@ -90,8 +90,8 @@ class PortBeams:
             start = np.broadcast_to(lanes[:, :1, of], known.shape[:2])
             return np.stack([start.ravel(), known[..., of].ravel()], axis=1)
 
-        integrals = known[..., lane.INTEGRALS : lane.INTEGRALS + lane.PARTS].reshape(-1, lane.PARTS)
-        curvature, torsion, bend = np.abs(ends(lane.CURVATURE)), ends(lane.TORSION), ends(lane.BEND)
+        integrals = known[..., lane.LANE.integrals : lane.LANE.integrals + lane.PARTS].reshape(-1, lane.PARTS)
+        curvature, torsion, bend = np.abs(ends(lane.LANE.kappa)), ends(lane.LANE.T), ends(lane.LANE.B)
         path = Path(self.waves.wavenumber, s, curvature, torsion, bend, integrals, np.zeros_like(curvature))
         tensor, order = self.waves.tensor(path), self.waves.order
         components, ratio = tensor.carried(order), None

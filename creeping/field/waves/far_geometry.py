@@ -47,7 +47,7 @@ from creeping.rays.tracer import TURN, RayTracer
 from creeping.rays.transport import Flow, carried
 from creeping.shadow.attachment import LaunchPoints, occluded
 from creeping.shadow.line import ShadowLine, shares_of
-from creeping.shadow.nodes import prepared
+from creeping.shadow.meshes import prepared
 from creeping.shadow.status import ATTACHED, NO_RAY
 from creeping.storage.memory import within_budget
 
@@ -272,7 +272,7 @@ class FarGeometry:
         long = fine[sample + 1] - fine[sample]
         begin = fine[sample] + along * long
         cell = np.stack([launch.spacing[which, ray], long], axis=1)
-        sought = self.direction[row], self.directions[row], near, begin, cell, np.bincount(row)[row]
+        sought = self.direction[row], self.directions[row], near, begin, cell
         one, found, moved = rays_towards(self.tracer, *sought)
         row, ray, cell, across, which = row[found], ray[found], cell[found], across[found, 0], which[found]
         arc = launch.arc_index

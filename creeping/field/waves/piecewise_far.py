@@ -58,10 +58,10 @@ from creeping.geometry.piecewise import Tiles, is_convex, pieces_of, tiles_of
 from creeping.geometry.surface import size
 from creeping.kernels.threads import in_threads
 from creeping.rays.fan import RayFan
-from creeping.rays.specular import SpecularPoints, joined, smooth_parts, some, specular_on_pieces, stand_clear
+from creeping.rays.specular import SpecularPoints, smooth_parts, specular_on_pieces, stand_clear
 from creeping.rays.status import AT_CREASES, RayStatus
 from creeping.shadow.attachment import occluded
-from creeping.shadow.edges import convex, unit_normals
+from creeping.shadow.piecewise import convex, unit_normals
 from creeping.storage.memory import within_budget
 
 WEDGE = 1.0
@@ -184,9 +184,9 @@ def _clear_points(
         np.add.at(number, points.observer, 1)
         np.add.at(clear, points.observer[stand_clear(body, points, k)], 1)
     serve = (number > 0) & (number == clear)
-    kept = [some(points, serve[points.observer]) for points in found]
+    kept = [points[serve[points.observer]] for points in found]
     kept = [points for points in kept if len(points.points)]
-    return serve, joined(kept) if kept else None
+    return serve, SpecularPoints.joined(kept) if kept else None
 
 
 def _edges(fan: RayFan, observers: FloatArray, k: float) -> tuple[FloatArray, float]:

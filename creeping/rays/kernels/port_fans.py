@@ -17,27 +17,49 @@ Sources: [C76]; Derivations, R1 and F25.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from creeping.kernels.block import copy
 from creeping.kernels.block import strict_options as options
-from creeping.rays.kernels.quantities import curvatures_along
+from creeping.rays.kernels.quantities import curvatures_along, polynomial_weights
+from creeping.rays.quantities import SHARPEST, STEEPEST
 
 BEHIND, AHEAD = 2, 3
 """Nodes that polynomials take before and behind an interval."""
 GUARD = 7
 """Steps traced beyond the last interval: three for its polynomial, one for each integral, two for derivatives."""
-SPREADING, RATE, BACK, ANGLE, CURVATURE, TORSION, BEND, INTEGRALS, ACROSS = 6, 7, 8, 9, 10, 11, 12, 13, 18
-TURNING, MOVING = 19, 20
-"""Lanes: x and p, J2, its rate M22, M11, the angle phi of (J2, J2'), kappa, T, B, integrals, kappa_t, A_theta, A_0."""
+
+
+class Lanes(NamedTuple):
+    """Where in a lane what is: x and p come first, and the integrals take PARTS."""
+
+    J2: int = 6
+    rate: int = 7
+    M11: int = 8
+    angle: int = 9
+    """Phi of (J2, J2')."""
+    kappa: int = 10
+    T: int = 11
+    B: int = 12
+    integrals: int = 13
+    across: int = 18
+    """kappa_t."""
+    turning: int = 19
+    """A_theta."""
+    moving: int = 20
+    """A_0."""
+
+
+LANE = Lanes()
 LANES, PARTS = 21, 5
 """Their number, and that of the integrals."""
 START = 3
 """Of the port itself: kappa, T and B."""
-STEEPEST, SHARPEST, TURNED = 4.0, 20.0, 1.5
-"""Bounds of |rho'|, of |rho rho''| and |B|, and of rho |g|: beyond, the expansion has no meaning."""
+TURNED = 1.5
+"""Bound of rho |g|, as of |rho'|, |rho rho''| and |B|: beyond, the expansion has no meaning."""
 NODES = BEHIND + AHEAD + 1
 TRIES, CLOSE = 12, 1e-11
 """Newton steps, and the last one of them in cells."""
@@ -64,7 +86,7 @@ def port_fan(level, level_par, step, scale, squares, states, lanes, last):
     kappa, across, torsion = np.empty((rays, J)), np.empty((rays, J)), np.empty((rays, J))
     for ray in range(rays):
         curvatures_along(level, level_par, states[ray], x, g, kappa[ray], across[ray], torsion[ray], normals)
-    rates = np.empty((7, J))
+    rates = np.empty((8, J))
     leaning, moving = np.empty(J), np.empty(J)
     for ray in range(rays):
         opposite = (ray + half) % rays
@@ -86,21 +108,21 @@ def port_fan(level, level_par, step, scale, squares, states, lanes, last):
             to = line[BEHIND + k]
             for axis in range(6):
                 to[axis] = states[ray, k, axis]
-            to[SPREADING], to[RATE], to[BACK] = states[ray, k, 8], states[ray, k, 9], states[ray, k, 6]
-            turned = math.atan2(to[SPREADING], scale * to[RATE])
-            before = line[BEHIND + k - 1, ANGLE] if k > 0 else 0.0
-            to[ANGLE] = turned + 2 * math.pi * math.floor((before - turned) / (2 * math.pi) + 0.5)
-            to[CURVATURE], to[TORSION], to[BEND], to[ACROSS] = (
+            to[LANE.J2], to[LANE.rate], to[LANE.M11] = states[ray, k, 8], states[ray, k, 9], states[ray, k, 6]
+            turned = math.atan2(to[LANE.J2], scale * to[LANE.rate])
+            before = line[BEHIND + k - 1, LANE.angle] if k > 0 else 0.0
+            to[LANE.angle] = turned + 2 * math.pi * math.floor((before - turned) / (2 * math.pi) + 0.5)
+            to[LANE.kappa], to[LANE.T], to[LANE.B], to[LANE.across] = (
                 kappa[ray, k],
                 torsion[ray, k],
                 rates[3, k],
                 across[ray, k],
             )
-            to[TURNING], to[MOVING] = leaning[k], moving[k]
+            to[LANE.turning], to[LANE.moving] = leaning[k], moving[k]
             for q in range(PARTS):
-                row = (0, 1, 2, 4, 5)[q]
-                so_far = line[BEHIND + k - 1, INTEGRALS + q] if k > 0 else 0.0
-                to[INTEGRALS + q] = so_far + (_stretch(rates, row, k - 1, step, k > 1) if k > 0 else 0.0)
+                row = (0, 1, 2, 7, 5)[q]
+                so_far = line[BEHIND + k - 1, LANE.integrals + q] if k > 0 else 0.0
+                to[LANE.integrals + q] = so_far + (_stretch(rates, row, k - 1, step, k > 1) if k > 0 else 0.0)
     for ray in range(rays):
         opposite = lanes[(ray + half) % rays]
         for k in range(1, BEHIND + 1):
@@ -108,21 +130,21 @@ def port_fan(level, level_par, step, scale, squares, states, lanes, last):
             copy(source, to)
             for lane in range(3, 6):
                 to[lane] = -source[lane]
-            to[SPREADING], to[ANGLE], to[TURNING] = -source[SPREADING], -source[ANGLE], -source[TURNING]
+            to[LANE.J2], to[LANE.angle], to[LANE.turning] = -source[LANE.J2], -source[LANE.angle], -source[LANE.turning]
             for q in range(PARTS):
-                to[INTEGRALS + q] = -source[INTEGRALS + q]
+                to[LANE.integrals + q] = -source[LANE.integrals + q]
 
 
 @njit(**options)
 def _rates(kappa, kappa_back, across, torsion, torsion_back, states, step, k, rates):
-    """Integrands at node k: of A, of both exponents without g, B, of A_theta in row 4, of the last one, and of A_0."""
+    """At node k the integrands of A, of both exponents without g, B, and those of A_theta, K, A_0 and the spreading."""
     before, behind = kappa[k - 1] if k > 0 else kappa_back[1], kappa[k - 2] if k > 1 else kappa_back[2 - k]
     slope = (8 * (kappa[k + 1] - before) - (kappa[k + 2] - behind)) / (12 * step)
     bend = (16 * (kappa[k + 1] + before) - 30 * kappa[k] - kappa[k + 2] - behind) / (12 * step * step)
     before, behind = torsion[k - 1] if k > 0 else torsion_back[1], torsion[k - 2] if k > 1 else torsion_back[2 - k]
     twist = (8 * (torsion[k + 1] - before) - (torsion[k + 2] - behind)) / (12 * step)
     if not kappa[k] > 0.0:
-        for row in range(7):
+        for row in range(8):
             rates[row, k] = 0.0
         return
     rho = 1.0 / kappa[k]
@@ -138,24 +160,18 @@ def _rates(kappa, kappa_back, across, torsion, torsion_back, states, step, k, ra
     rates[5, k] = (kappa[k] * across[k] - torsion[k] ** 2) / (root * root)
     rates[4, k] = 2 / 3 / root * (states[k, 8] * twist + 2 * states[k, 9] * torsion[k])
     rates[6, k] = 2 / 3 / root * (states[k, 6] * twist + 2 * states[k, 7] * torsion[k])
+    rates[7, k] = root * root * (across[k] * rho / 3 - 1 / 12 - 5 / 18 * t)
 
 
 @njit(**options)
 def _add_torsion(kappa, torsion, leaning, spreading, squares, k, rates):
-    """Complete the first exponent's integrand by g, and put that of the spreading's change into row 4."""
-    if not kappa > 0.0:
-        rates[4, k] = 0.0
-        return
-    root, rho = kappa ** (1 / 3), 1.0 / kappa
-    g = 4 / 3 * torsion
-    if k > 0 and spreading != 0.0:
-        g = root * leaning / spreading
-    g = min(max(g, -TURNED * kappa), TURNED * kappa)
-    rates[1, k] -= root**4 * rho * rho * (0.25 * squares * g * g - 2 / 3 * g * torsion + 0.4 * torsion * torsion)
-    t = (torsion * rho) ** 2
-    # r from the second exponent's integrand
-    r = 4 * (rates[2, k] / root**4 - 0.1 + rates[3, k] / 60 + 0.15 * t)
-    rates[4, k] = root * root * (r / 3 - 1 / 12 - 5 / 18 * t)
+    """Complete the first exponent's integrand by g."""
+    if kappa > 0.0:
+        root, g = kappa ** (1 / 3), 4 / 3 * torsion
+        if k > 0 and spreading != 0.0:
+            g = root * leaning / spreading
+        g = min(max(g, -TURNED * kappa), TURNED * kappa)
+        rates[1, k] -= (0.25 * squares * g * g - 2 / 3 * g * torsion + 0.4 * torsion * torsion) * root**4 / kappa**2
 
 
 @njit(**options)
@@ -169,49 +185,30 @@ def _stretch(rates, row, k, step, central):
 
 
 @njit(**options)
-def _weights(u, value, slope):
-    """Lagrange weights of NODES places -BEHIND ... AHEAD at u, and their derivatives."""
-    for j in range(NODES):
-        product, total = 1.0, 0.0
-        for i in range(NODES):
-            if i != j:
-                part = 1.0
-                for q in range(NODES):
-                    if q != j:
-                        part *= (1.0 if q == i else u - (q - BEHIND)) / (j - q)
-                total += part
-                product *= (u - (i - BEHIND)) / (j - i)
-        value[j], slope[j] = product, total
+def _sum(lanes, m, k, aside, along, first, many, out):
+    """Sums of so many lanes from the first, around cell (m, k), by weights (NODES,) in angle and in s."""
+    for lane in range(many):
+        out[lane] = 0.0
+    for i in range(aside.shape[0]):
+        ray = lanes[(m + i - BEHIND) % lanes.shape[0]]
+        for j in range(along.shape[0]):
+            weight = aside[i] * along[j]
+            for lane in range(many):
+                out[lane] += weight * ray[k + j, first + lane]
 
 
 @njit(**options)
-def _point(lanes, m, k, w, point, along, aside):
-    """x and its derivatives in s and angle, in cells, by weights w (4, NODES) of angle and s, around cell (m, k)."""
-    rays = lanes.shape[0]
-    for axis in range(3):
-        point[axis] = along[axis] = aside[axis] = 0.0
-    for i in range(NODES):
-        ray = lanes[(m + i - BEHIND) % rays]
-        for axis in range(3):
-            value = rate = 0.0
-            for j in range(NODES):
-                value += w[2, j] * ray[k + j, axis]
-                rate += w[3, j] * ray[k + j, axis]
-            point[axis] += w[0, i] * value
-            along[axis] += w[0, i] * rate
-            aside[axis] += w[1, i] * value
-
-
-@njit(**options)
-def _refined(lanes, m, k, target, place, w, work):
+def _refined(lanes, matrix, m, k, target, place, w, work):
     """Newton's method for x(angle, s) = target from the place (2,), in cells from node (m, k); returns success."""
     point, along, aside = work[0], work[1], work[2]
     for _ in range(TRIES):
         if not (abs(place[0] - 0.5) < 1.5 and abs(place[1] - 0.5) < 1.5):
             return False
-        _weights(place[0], w[0], w[1])
-        _weights(place[1], w[2], w[3])
-        _point(lanes, m, k, w, point, along, aside)
+        for axis in range(2):
+            polynomial_weights(matrix, place[axis], 1.0, w[axis])
+        _sum(lanes, m, k, w[0, 0], w[1, 0], 0, 3, point)
+        _sum(lanes, m, k, w[0, 0], w[1, 1], 0, 3, along)
+        _sum(lanes, m, k, w[0, 1], w[1, 0], 0, 3, aside)
         aa = ab = bb = ea = eb = 0.0
         for axis in range(3):
             e = target[axis] - point[axis]
@@ -235,15 +232,19 @@ def _refined(lanes, m, k, target, place, w, work):
 
 
 @njit(**options)
-def passed(lanes, last, ports, after, grid, origin, edge, starts, members, pad, folds, owner, found):
+def passed(lanes, last, matrices, ports, order, along, after, pad, folds, owner, found):
     """Where the fan passes ports (n, 3) of numbers above ``after``; returns how many passages there are.
+
+    One that lies on the border of cells may be found in each of them, and where rays merge several times in one.
 
     Parameters
     ----------
     lanes, last
         Of `port_fan`.
-    grid, origin, edge, starts, members
-        Boxes of ports: numbers along the axes (3,), a corner, L, their edge, L, the first member of each, the members.
+    matrices : (NODES, NODES) x 2
+        `polynomial_matrix` of the nodes around a cell, and of the four nearest of them.
+    order, along : (n,), int
+        Numbers of ports by their coordinate of number ``along``.
     pad : float, L
         How far from where rays merge a port counts as close to it.
     folds : (2, n)
@@ -254,10 +255,8 @@ def passed(lanes, last, ports, after, grid, origin, edge, starts, members, pad, 
         itself, and how far polynomials of degree 3 differ in x, L; past ``most`` only counted.
     """
     rays, count = lanes.shape[0], lanes.shape[1]
-    most, total = len(owner), 0
-    first, following = np.full(len(ports), -1), np.empty(most, np.int64)
-    w, work, place, target = np.empty((4, NODES)), np.empty((3, 3)), np.empty(2), np.empty(3)
-    middle, low, high = np.empty(3), np.empty(3, np.int64), np.empty(3, np.int64)
+    most, total, sorted_ = len(owner), 0, ports[order, along]
+    w, work, place, middle = np.empty((2, 3, NODES)), np.empty((3, 3)), np.empty(2), np.empty(3)
     for m in range(rays):
         one, two = lanes[m], lanes[(m + 1) % rays]
         for k in range(BEHIND, count - AHEAD):
@@ -266,95 +265,58 @@ def passed(lanes, last, ports, after, grid, origin, edge, starts, members, pad, 
                 middle[axis] = 0.25 * (one[k, axis] + one[k + 1, axis] + two[k, axis] + two[k + 1, axis])
             for corner in range(4):
                 at = (one[k], one[k + 1], two[k], two[k + 1])[corner]
-                square = 0.0
-                for axis in range(3):
-                    square += (at[axis] - middle[axis]) ** 2
-                radius = max(radius, math.sqrt(square))
-            least = min(min(one[k, 6], one[k + 1, 6]), min(two[k, 6], two[k + 1, 6]))
-            greatest = max(max(one[k, 6], one[k + 1, 6]), max(two[k, 6], two[k + 1, 6]))
-            folded = least < 0.0 < greatest and k > BEHIND
+                radius = max(radius, math.sqrt(_square(at, middle)))
+            least = min(min(one[k, LANE.J2], one[k + 1, LANE.J2]), min(two[k, LANE.J2], two[k + 1, LANE.J2]))
+            most_ = max(max(one[k, LANE.J2], one[k + 1, LANE.J2]), max(two[k, LANE.J2], two[k + 1, LANE.J2]))
             dead = k + 1 - BEHIND > min(last[m], last[(m + 1) % rays])
+            folded = least < 0.0 < most_ and k > BEHIND and not dead
             reach = PAD * radius
-            wide = reach + pad if folded and not dead else reach
-            for axis in range(3):
-                low[axis] = max(math.floor((middle[axis] - wide - origin[axis]) / edge), 0)
-                high[axis] = min(math.floor((middle[axis] + wide - origin[axis]) / edge), grid[axis] - 1)
-            for bx in range(low[0], high[0] + 1):
-                for by in range(low[1], high[1] + 1):
-                    for bz in range(low[2], high[2] + 1):
-                        box = (bx * grid[1] + by) * grid[2] + bz
-                        for number in range(starts[box], starts[box + 1]):
-                            j = members[number]
-                            if j <= after:
-                                continue
-                            square = 0.0
-                            for axis in range(3):
-                                target[axis] = ports[j, axis]
-                                square += (target[axis] - middle[axis]) ** 2
-                            if square > wide * wide:
-                                continue
-                            if dead:
-                                folds[1, j] = min(folds[1, j], one[k, INTEGRALS])
-                                continue
-                            if folded:
-                                folds[0, j] = min(folds[0, j], one[k, INTEGRALS])
-                            if square > reach * reach:
-                                continue
-                            for start in range(4 if folded else 1):
-                                place[0], place[1] = (start % 2) * 1.0, (start // 2) * 1.0
-                                if not folded:
-                                    place[0] = place[1] = 0.5
-                                if not _refined(lanes, m, k - BEHIND, target, place, w, work):
-                                    continue
-                                if not (-1e-6 < place[0] < 1 + 1e-6 and -1e-6 < place[1] < 1 + 1e-6):
-                                    continue
-                                angle, length = m + place[0], k - BEHIND + place[1]
-                                known, other = False, first[j]
-                                while other >= 0:
-                                    turn = abs(found[other, 0] - angle)
-                                    turn = min(turn, rays - turn)
-                                    known |= turn < 1e-4 and abs(found[other, 1] - length) < 1e-4
-                                    other = following[other]
-                                if known:
-                                    continue
-                                if total < most:
-                                    owner[total], following[total], first[j] = j, first[j], total
-                                    found[total, 0], found[total, 1] = angle, length
-                                    _read(lanes, m, k - BEHIND, place, w, found[total, 2:])
-                                total += 1
+            wide = reach + pad if folded else reach
+            number = np.searchsorted(sorted_, middle[along] - wide)
+            while number < len(ports) and sorted_[number] <= middle[along] + wide:
+                j = order[number]
+                number += 1
+                square = _square(ports[j], middle)
+                if j <= after or square > wide * wide:
+                    continue
+                if dead or folded:
+                    row = 1 if dead else 0
+                    folds[row, j] = min(folds[row, j], one[k, LANE.integrals])
+                if dead or square > reach * reach:
+                    continue
+                # two rays may pass a port in a cell in which neighbours cross: from all its corners
+                for start in range(4 if folded else 1):
+                    place[0], place[1] = (start % 2) * 1.0, (start // 2) * 1.0
+                    if not folded:
+                        place[0] = place[1] = 0.5
+                    if not _refined(lanes, matrices[0], m, k - BEHIND, ports[j], place, w, work):
+                        continue
+                    if not (-1e-6 < place[0] < 1 + 1e-6 and -1e-6 < place[1] < 1 + 1e-6):
+                        continue
+                    if total < most:
+                        owner[total], found[total, 0], found[total, 1] = j, m + place[0], k - BEHIND + place[1]
+                        _read(lanes, matrices, m, k - BEHIND, place, w, found[total, 2:])
+                    total += 1
     return total
 
 
 @njit(**options)
-def _read(lanes, m, k, place, w, out):
+def _square(x, y):
+    """Square of the distance of two points."""
+    return (x[0] - y[0]) ** 2 + (x[1] - y[1]) ** 2 + (x[2] - y[2]) ** 2
+
+
+@njit(**options)
+def _read(lanes, matrices, m, k, place, w, out):
     """All lanes at a place of cell (m, k), those of the port, and the difference of polynomials."""
-    rays = lanes.shape[0]
-    _weights(place[0], w[0], w[1])
-    _weights(place[1], w[2], w[3])
-    for lane in range(LANES):
-        out[lane] = 0.0
-    for lane in range(LANES, LANES + START):
-        out[lane] = 0.0
-    for i in range(NODES):
-        ray = lanes[(m + i - BEHIND) % rays]
-        for j in range(NODES):
-            weight = w[0, i] * w[2, j]
-            for lane in range(LANES):
-                out[lane] += weight * ray[k + j, lane]
-        for lane in range(START):
-            out[LANES + lane] += w[0, i] * ray[BEHIND, CURVATURE + lane]
-    u, v = place[0], place[1]
-    coarse, four = np.zeros(3), np.empty((2, 4))
-    for row in range(2):
-        z = u if row == 0 else v
-        four[row, 0], four[row, 1] = -z * (z - 1) * (z - 2) / 6, (z + 1) * (z - 1) * (z - 2) / 2
-        four[row, 2], four[row, 3] = -(z + 1) * z * (z - 2) / 2, (z + 1) * z * (z - 1) / 6
-    for i in range(4):
-        ray = lanes[(m + i - 1) % rays]
-        for j in range(4):
-            for axis in range(3):
-                coarse[axis] += four[0, i] * four[1, j] * ray[k + j + 1, axis]
-    square = 0.0
-    for axis in range(3):
-        square += (coarse[axis] - out[axis]) ** 2
-    out[LANES + START] = math.sqrt(square)
+    for axis in range(2):
+        polynomial_weights(matrices[0], place[axis], 1.0, w[axis])
+    _sum(lanes, m, k, w[0, 0], w[1, 0], 0, LANES, out)
+    # at the port itself
+    w[1, 1, 1:], w[1, 1, 0] = 0.0, 1.0
+    _sum(lanes, m, BEHIND, w[0, 0], w[1, 1, :1], LANE.kappa, START, out[LANES:])
+    coarse = np.zeros(3)
+    for axis in range(2):
+        polynomial_weights(matrices[1], place[axis], 1.0, w[axis])
+    _sum(lanes, m, k, w[0, 0], w[1, 0], 0, 3, coarse)
+    out[LANES + START] = math.sqrt(_square(coarse, out))

@@ -20,9 +20,9 @@ from creeping.rays.quantities import GAUSS, GUARD, SHARPEST, STRAIGHT
 WIDTH = 2 * GUARD
 
 
-def polynomial_matrix() -> np.ndarray:
-    """Coefficients of powers of u of the Lagrange polynomials of the places 1 - GUARD ... GUARD: (powers, places)."""
-    places = np.arange(1.0 - GUARD, GUARD + 1.0)
+def polynomial_matrix(half: int) -> np.ndarray:
+    """Coefficients of powers of u of the Lagrange polynomials of the places 1 - half ... half: (powers, places)."""
+    places = np.arange(1.0 - half, half + 1.0)
     columns = []
     for place in places:
         # products of whole numbers: exact, where an inverse of their powers loses seven digits
@@ -32,11 +32,11 @@ def polynomial_matrix() -> np.ndarray:
 
 
 @njit(**options)
-def _weights(matrix, u, step, w):
-    """Weights w (3, WIDTH) of value and two derivatives at u steps after the middle of the places."""
-    for j in range(WIDTH):
+def polynomial_weights(matrix, u, step, w):
+    """Weights w (3, places) of value and two derivatives at u steps after the place 0 of `polynomial_matrix`."""
+    for j in range(matrix.shape[0]):
         value = slope = bend = 0.0
-        for m in range(WIDTH - 1, -1, -1):
+        for m in range(matrix.shape[0] - 1, -1, -1):
             bend = bend * u + 2.0 * slope
             slope = slope * u + value
             value = value * u + matrix[m, j]
@@ -90,7 +90,7 @@ def cross(level, level_par, matrix, states, step, owner, observers, times):
         ray, r, begin = states[owner[row]], observers[row], times[row]
         for _ in range(4):
             last = min(max(int(times[row] / step), 0), states.shape[1] - 2 * GUARD - 1)
-            _weights(matrix, times[row] / step - last, step, w)
+            polynomial_weights(matrix, times[row] / step - last, step, w)
             for axis in range(3):
                 x[axis, 0] = p[axis] = 0.0
                 for j in range(WIDTH):
@@ -232,7 +232,7 @@ def quantities_at(
     weights = np.empty((GAUSS, 3, WIDTH))
     at, parts, one = np.empty((4, K)), np.empty((5, K)), np.empty((4, 1))
     for q in range(GAUSS):
-        _weights(matrix, nodes[q], step, weights[q])
+        polynomial_weights(matrix, nodes[q], step, weights[q])
     row, n = 0, owner.shape[0]
     while row < n:
         ray = states[owner[row]]
@@ -245,7 +245,7 @@ def quantities_at(
             level, level_par, (weights, gauss_weights), scale, ray, step, known, kappa, across, normals, totals,
             angles, good, (g, at, parts), joints,
         )  # fmt: skip
-        _weights(matrix, 0.0, step, w)
+        polynomial_weights(matrix, 0.0, step, w)
         for d in range(3):
             starts[row, 2 + d] = _applied(w, d, kappa, GUARD)
         starts[row, 5] = across[GUARD]
@@ -256,7 +256,7 @@ def quantities_at(
             last = min(max(int(times[point] / step), 0), K - 2 * GUARD - 1)
             part = times[point] / step - last
             i = last + GUARD
-            _weights(matrix, part, step, w)
+            polynomial_weights(matrix, part, step, w)
             for lane in range(8):
                 lanes[point, lane] = 0.0
                 for j in range(WIDTH):
@@ -271,7 +271,7 @@ def quantities_at(
             for d in range(5):
                 parts[d, 0] = totals[last, d]
             for q in range(GAUSS if part > 0.0 and positive else 0):
-                _weights(matrix, part * nodes[q], step, w)
+                polynomial_weights(matrix, part * nodes[q], step, w)
                 for d in range(3):
                     one[d, 0] = _applied(w, d, kappa, i)
                 one[3, 0] = _applied(w, 0, across, i)

@@ -11,6 +11,7 @@ Sources: Derivations, R12 and R14.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -21,9 +22,22 @@ from creeping.kernels.exponential import adjugate_form, second_form
 
 PARTS = 4
 """Samples of a step."""
-NORMAL, ASIDE, TANGENT, TURN, SPREADING, RATE, CURVATURE = 0, 3, 6, 9, 12, 13, 14
-"""Components of a sample: n, b = n x p, p, dn/ds, J, J', kappa_n; SAMPLE in all."""
-SAMPLE = 15
+
+
+class Sample(NamedTuple):
+    """Where in a sample what is: n, b = n x p, p, dn/ds, J, J' and kappa_n."""
+
+    n: int = 0
+    b: int = 3
+    p: int = 6
+    turn: int = 9
+    J: int = 12
+    rate: int = 13
+    kappa: int = 14
+
+
+AT, SAMPLE = Sample(), 15
+"""And the number of its components."""
 AWAY = -0.5
 """p.r at the end of a step up to which it is passed over; a step turns a ray by about a radian at most."""
 
@@ -123,13 +137,14 @@ def sample_fan(level, level_par, weights, states, arc, first, samples, alive, wo
             hz = (g[8, i] * px + g[7, i] * py + g[6, i] * pz) * inverse
             along = nx * hx + ny * hy + nz * hz
             s = skipped + i
-            out[NORMAL, s], out[NORMAL + 1, s], out[NORMAL + 2, s] = nx, ny, nz
-            out[ASIDE, s], out[ASIDE + 1, s] = ny * pz - nz * py, nz * px - nx * pz
-            out[ASIDE + 2, s] = nx * py - ny * px
-            out[TANGENT, s], out[TANGENT + 1, s], out[TANGENT + 2, s] = px, py, pz
-            out[TURN, s], out[TURN + 1, s], out[TURN + 2, s] = hx - along * nx, hy - along * ny, hz - along * nz
-            out[SPREADING, s], out[RATE, s] = J[0, i], J[1, i]
-            out[CURVATURE, s] = px * hx + py * hy + pz * hz
+            out[AT.n, s], out[AT.n + 1, s], out[AT.n + 2, s] = nx, ny, nz
+            out[AT.b, s], out[AT.b + 1, s] = ny * pz - nz * py, nz * px - nx * pz
+            out[AT.b + 2, s] = nx * py - ny * px
+            out[AT.p, s], out[AT.p + 1, s], out[AT.p + 2, s] = px, py, pz
+            out[AT.turn, s], out[AT.turn + 1, s] = hx - along * nx, hy - along * ny
+            out[AT.turn + 2, s] = hz - along * nz
+            out[AT.J, s], out[AT.rate, s] = J[0, i], J[1, i]
+            out[AT.kappa, s] = px * hx + py * hy + pz * hz
     return roots / launched if launched else 1.0
 
 
@@ -181,12 +196,12 @@ def seek(step, samples, certain, arc, closed, r, back, skipped, early, along, ce
             continue
         alive = certain[ray]
         for i in range(skipped, m):
-            alive &= one[CURVATURE, i] > 0.0
+            alive &= one[AT.kappa, i] > 0.0
             if i == skipped or not (height[0, i] * height[0, i - 1] < 0.0 and height[2, i] > 0.0):
                 continue
             before, now = height[0, i - 1], height[0, i]
-            slope = one[TURN, i - 1] * r[0] + one[TURN + 1, i - 1] * r[1] + one[TURN + 2, i - 1] * r[2]
-            after = one[TURN, i] * r[0] + one[TURN + 1, i] * r[1] + one[TURN + 2, i] * r[2]
+            slope = one[AT.turn, i - 1] * r[0] + one[AT.turn + 1, i - 1] * r[1] + one[AT.turn + 2, i - 1] * r[2]
+            after = one[AT.turn, i] * r[0] + one[AT.turn + 1, i] * r[1] + one[AT.turn + 2, i] * r[2]
             u = before / (before - now)
             for _ in range(3):
                 value, rate = _cubic(before, h * slope, now, h * after, u)
@@ -196,10 +211,8 @@ def seek(step, samples, certain, arc, closed, r, back, skipped, early, along, ce
             crossings[crossed], at[crossed, 0], at[crossed, 1] = ray, (i - 1 + u) * h, height[2, i]
             crossed += 1
             if alive and height[2, i] > along and (i - 1 + u) * h > early:
-                spread, rate = _cubic(
-                    one[SPREADING, i - 1], h * one[RATE, i - 1], one[SPREADING, i], h * one[RATE, i], u
-                )
-                curved = one[CURVATURE, i - 1] + u * (one[CURVATURE, i] - one[CURVATURE, i - 1])
+                spread, rate = _cubic(one[AT.J, i - 1], h * one[AT.rate, i - 1], one[AT.J, i], h * one[AT.rate, i], u)
+                curved = one[AT.kappa, i - 1] + u * (one[AT.kappa, i] - one[AT.kappa, i - 1])
                 least = min(least, abs(spread) / (abs(spread) + abs(rate) / h / curved))
                 any_ = True
     for ray in range(arc.shape[0]):

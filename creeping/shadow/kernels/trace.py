@@ -22,10 +22,6 @@ from creeping.shadow.kernels.newton import move, work_space
 
 CURVES = 16
 """Curves of a line at most."""
-FOUND, CERTAIN, ERROR = 0, 1, 2
-"""What is known of a line: the number of its curves, 0 for none, whether every step was certain, and its length's
-relative error; KNOWN in all."""
-KNOWN = 3
 LEAST_NODES = 64
 """Nodes of a curve at least; their number is a multiple of 8."""
 APART = 0.45
@@ -48,7 +44,9 @@ _FOUR = np.array([13, -1, 0, 0, 0, 0]) / 24
 
 
 @njit(**options)
-def lines_on_mesh(level, level_par, extent, mesh, waves, x, tangents, curvature, starts, spacing, known):
+def lines_on_mesh(
+    level, level_par, extent, mesh, waves, x, tangents, curvature, starts, spacing, found, certain, error
+):
     """Nodes of the lines of waves (n, 4), (d, w), the longest curve of each first.
 
     Parameters
@@ -63,7 +61,8 @@ def lines_on_mesh(level, level_par, extent, mesh, waves, x, tangents, curvature,
         Nodes, T and kappa_n, as many as `starts` says.
     starts : (n, CURVES + 1), spacing : (n, CURVES), filled
         First node of each curve and their end, and the spacing.
-    known : (n, KNOWN), filled
+    found, certain, error : (n,), filled
+        Number of curves, 0 for none, whether every step was certain of them, and their length's relative error.
     """
     vertices, _, triangles, _, edge, _, wanted = mesh
     n, m = vertices.shape[1], triangles.shape[0]
@@ -76,32 +75,32 @@ def lines_on_mesh(level, level_par, extent, mesh, waves, x, tangents, curvature,
     # a number of steps that is no constant, for which `move` would be compiled once more
     reach, once = REACH * edge, np.int64(1)
     for row in range(waves.shape[0]):
-        known[row, FOUND] = 0.0
+        found[row] = 0
         wave, y, T, kappa, begin = waves[row : row + 1], x[row], tangents[row], curvature[row], starts[row]
         curves = _walk(mesh, waves[row], s, marks, row, raw, first)
         if curves < 1:
             continue
         some = first[curves]
         step = move(level, level_par, wave, raw[:some], reach, once, space, slopes, bent, left)
-        certain = step < COARSE_STEP * edge
-        more = once if certain else MORE * once
+        sure = step < COARSE_STEP * edge
+        more = once if sure else MORE * once
         if not move(level, level_par, wave, raw[:some], reach, more, space, slopes, bent, left) < math.inf:
             continue
         leans, whole = _lengths(raw, slopes, first, curves, h, lengths)
         if not whole < 1e6 * extent:
             continue
         end = _resampled(raw, slopes, first, curves, h, lengths, whole, wanted, y, begin)
-        good, error, rough = end > 0, 0.0, 0.0
+        good, off, rough = end > 0, 0.0, 0.0
         for again in range(2):
             step = move(level, level_par, wave, y[:end], reach, once, space, T, kappa, left) if good else math.inf
-            certain &= step < UNSETTLED * extent
+            sure &= step < UNSETTLED * extent
             good &= step < LOST * extent
             if good:
-                whole, error, rough = _spaced(y, T, begin, curves, padded, h, spacing[row], again == 0)
+                whole, off, rough = _spaced(y, T, begin, curves, padded, h, spacing[row], again == 0)
                 good = whole < math.inf
         if good:
-            known[row, FOUND], known[row, ERROR] = curves, error / whole
-            known[row, CERTAIN] = certain and not leans and rough < SETTLED * whole and error < PRECISE * whole
+            found[row], error[row] = curves, off / whole
+            certain[row] = sure and not leans and rough < SETTLED * whole and off < PRECISE * whole
 
 
 @njit(**options)
