@@ -74,7 +74,7 @@ class CriticalPoints:
         return SingularIncidenceError(
             f"the shadow line {trouble} at {len(points)} points: {named}{more} "
             f"(least |n.d| at a critical point {self.distance:.1e}); perturb the direction, or move the source, by say "
-            "1e-3",
+            "1e-3; fields of plane waves need no line: creeping.solve",
             points=points,
             distance=self.distance,
         )
