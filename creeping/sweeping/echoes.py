@@ -262,14 +262,19 @@ def _swept(
         raise InvalidInputError("resume goes with store=, the folder of the results")
     options: dict[str, Any] = dict(asked)
     known = begun(store) if store else None
-    flow: Flow | Surface | None = known.flow(body) if known else None
-    if flow is None and (why_no_rays(body) or asked["method"] == "t-matrix"):
+    flow: Flow | Surface
+    if why_no_rays(body) or asked["method"] == "t-matrix":
         flow = body
-    elif flow is None and by_equation_alone(body, k, [asked["boundary"]], len(incidences), method=asked["method"]):
+    elif by_equation_alone(body, k, [asked["boundary"]], len(incidences), method=asked["method"]):
         flow = NoFlow(body)
-    if flow is None or not (flow is body or isinstance(flow, NoFlow)):
+    else:
         length = body_length(body, float(k.min()))
-        flow = flow or choose_flow(body, n_rays=2 * asked["n_rays"] * len(incidences), length=length, cache=cache)
+        # the first block may have needed none, where others do
+        stored = known.flow(body) if known else None
+        rays = 2 * asked["n_rays"] * len(incidences)
+        if stored is None or isinstance(stored, NoFlow):
+            stored = choose_flow(body, n_rays=rays, length=length, cache=cache)
+        flow = stored
         # small enough that progress is told in time, large enough that a task is not all overhead
         options |= {"chunk": TASK, "length": length}
 

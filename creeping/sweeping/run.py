@@ -166,12 +166,16 @@ def sweep_directions(
         raise InvalidInputError(f"directions have shape {unit.shape}; give rows of three numbers, shape (n, 3)")
     going_on = store is not None and resume and Path(store).exists()
     if going_on:
-        flow = NoFlow(flow.body) if SweepStore.open(str(store)).key["flow"]["kind"] == "none" else flow
+        # whether rays are needed may be judged otherwise today, as memory is
+        begun = SweepStore.open(str(store))
+        if (begun.key["flow"]["kind"] == "none") != isinstance(flow, NoFlow):
+            flow, length = begun.flow(flow.body), begun.key["request"]["length"]
     elif not isinstance(flow, NoFlow) and solved_alone(flow.body, request, len(unit)):
         flow = NoFlow(flow.body)
-    if not isinstance(flow, NoFlow):
-        leap = flow.horizon if isinstance(flow, PhaseMap) else 0.0
-        request = replace(request, length=sweep_length(flow.body, length, request.wavenumbers, leap=leap))
+    leap = flow.horizon if isinstance(flow, PhaseMap) else 0.0
+    bare = isinstance(flow, NoFlow)
+    known = 1.0 if bare else sweep_length(flow.body, length, request.wavenumbers, leap=leap)
+    request = replace(request, length=known)
     request = with_lattice(request, unit)
     chunk = None if chunk is None else whole_number(chunk, "chunk")
     chunk = (

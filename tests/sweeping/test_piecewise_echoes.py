@@ -74,3 +74,20 @@ def test_currents_of_a_body_with_edges_are_those_of_its_equation():
     # nothing is launched that is not needed
     assert ds.attrs["flow"] == "none"
     np.testing.assert_allclose(ds.field.total.values.squeeze(), exact.total, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_an_echo_goes_on_the_way_it_was_begun(tmp_path, monkeypatch):
+    """Whether rays are needed is a question of memory, too, which is another when a run is resumed."""
+    asked = {"wavenumbers": [3.0, 4.0], "azimuth": [0.0, 70.0], "boundary": "hard", "cache": False}
+    for alone in (True, False):
+        with monkeypatch.context() as patch:
+            for room in ("echoes", "request"):
+                patch.setattr(f"creeping.sweeping.{room}.by_equation_alone", lambda *_, now=alone, **__: now)
+            first = cr.bistatic(sc.Cylinder(0.5, 1.0), store=tmp_path / str(alone), **asked)
+        assert (first.attrs["flow"] == "none") == alone
+        with monkeypatch.context() as patch:
+            for room in ("echoes", "request"):
+                patch.setattr(f"creeping.sweeping.{room}.by_equation_alone", lambda *_, now=not alone, **__: now)
+            again = cr.bistatic(sc.Cylinder(0.5, 1.0), store=tmp_path / str(alone), resume=True, **asked)
+        assert again.identical(first)
