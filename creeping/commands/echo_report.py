@@ -47,11 +47,10 @@ def run_echo(job: EchoJob, shape: Any, progress: Progress) -> str:
     reference = reference_of(request, given.compare, given.column, given.align)
     azimuths, elevations = request.angles(shape)
     count = len(azimuths)
-    if method == "auto" and mono:
-        method = monostatic_method(shape, k, boundary, count)
+    served = monostatic_method(shape, k, boundary, count) if method == "auto" and mono else method
     radar, observers = ((azimuths, elevations), 1) if mono else (request.incidence, count)
     seen: dict[str, Any] = {"radar": radar, "observers": observers, "metres": True, "cure": request.cure}
-    told = forecast(shape, k, boundary, method=method, **seen)
+    told = forecast(shape, k, boundary, method=served, **seen)
     progress.note(f"{told.body}, {boundary_words(boundary)}")
     unfinished = begun(output, quantity, asked_for(body, shape, **words), resume=given.resume)
     if unfinished is None:
@@ -208,10 +207,12 @@ def _profiles(echo: Echo) -> dict[str, RangeProfile]:
     """Range profiles by channel, of backscatter in one direction over a band of 16 or more equal steps, all finite."""
     if echo.incidence is not None or len(echo.azimuth) > 1 or len(echo.wavenumbers) < 16:
         return {}
+    # inf: of what has no error none is known
+    known = np.where(np.isnan(echo.error), np.inf, echo.error)
     try:
         return {
             channel: range_profile(values[0], echo.wavenumbers, error=error[0])
-            for channel, values, error in zip(echo.channels, echo.total, echo.error, strict=True)
+            for channel, values, error in zip(echo.channels, echo.total, known, strict=True)
         }
     except InvalidInputError:
         return {}
@@ -293,8 +294,9 @@ def readable(summary: dict[str, Any], output: Path) -> str:
     count, values = summary["by_currents"], summary["values"]
     rest = "" if count == values else f", the others by {others}"
     served = f"{count} of {values} values by currents{rest}"
-    if summary["otherwise_by"] == "t-matrix":
-        served = "all values by the T-matrix of the body"
+    together = {"t-matrix": "the T-matrix of the body", "equation": "the integral equation"}
+    if summary["otherwise_by"] in together:
+        served = f"all values by {together[summary['otherwise_by']]}"
     rows.append(f"{served}; {summary['unresolved']} unresolved")
     least, largest = summary["validity"]["least_k_rho"], summary["validity"]["largest_transverse"]
     if least is not None and largest is not None:

@@ -214,7 +214,7 @@ def run(
         if unfinished is None:
             print((output / resuming.SUMMARY).read_text() if json_ else f"nothing is missing in {output}")
             return 0
-        without = why_no_rays(shape)
+        without, singular = why_no_rays(shape), None
         if not without:
             progress("shadow line")
             try:
@@ -223,9 +223,13 @@ def run(
                 if job is None or source is not None:
                     raise
                 # the equation needs no line
-                without = str(error)
+                without, singular = str(error), error
         if without:
-            result = _run_results.run_solved(shape, without, job, incident, planes, written, progress, unfinished)
+            try:
+                result = _run_results.run_solved(shape, without, job, incident, planes, written, progress, unfinished)
+            except cr.InvalidInputError as error:
+                # rays of a direction close by are what is left
+                raise singular or error from error
             print(json.dumps(result, indent=1) if json_ else _run_results.readable_solved(result, output))
             return 0
         length = ray_length(line, length, wavenumber=job.wavenumber if job else None)

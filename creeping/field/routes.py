@@ -247,7 +247,9 @@ def by_equation_alone(
         return False
     if any(has_expansions(body, boundary) for boundary in boundaries):
         return False
-    return not any(plan_of(body, float(k), b, incidences=incidences).refused for k in wavenumbers for b in boundaries)
+    plans = [plan_of(body, float(k), b, incidences=incidences) for k in wavenumbers for b in boundaries]
+    # what is asked for is fine tiles for each, which all together may not have
+    return not any(plan.refused or (method == "equation" and plan.effort.coarse) for plan in plans)
 
 
 def far_currents(problem: Problem, directions: int) -> SurfaceCurrents | None:

@@ -14,7 +14,7 @@ Sources: Derivations, R6, R7 and R19.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -338,11 +338,6 @@ class ShadowLines(Rows):
     concave: FloatArray
     singular_distance: FloatArray
     launch: LaunchPoints
-
-    def of(self, rows: IntArray) -> ShadowLines:
-        """Those of some incidences."""
-        parts: dict[str, Any] = {one.name: getattr(self, one.name) for one in fields(self)}
-        return ShadowLines(**{name: part.of(rows) if name == "launch" else part[rows] for name, part in parts.items()})
 
 
 def shadow_lines(body: Surface, directions: FloatArray, n_rays: int, *, every: bool = False) -> ShadowLines:

@@ -250,8 +250,6 @@ def _swept(
     count = len(incidences) * len(k) * len(asked.get("observation", (None,)))
     if count > MOST:
         raise InvalidInputError(f"{count} values are asked for at once; {MOST} are the most: give a coarser step")
-    if asked["method"] == "auto" and asked["quantity"] == "monostatic":
-        asked["method"] = monostatic_method(body, k, asked["boundary"], len(incidences))
     store, resume, rows = storing
     # before the time is spent
     if store is not None:
@@ -260,8 +258,12 @@ def _swept(
             raise InvalidInputError(f"{store} exists; give resume=True to go on with it, or choose another store")
     elif resume:
         raise InvalidInputError("resume goes with store=, the folder of the results")
-    options: dict[str, Any] = dict(asked)
     known = begun(store) if store else None
+    if asked["method"] == "auto" and asked["quantity"] == "monostatic":
+        # what is quicker may be another way today
+        told = known and known.key["request"]["method"]
+        asked["method"] = told or monostatic_method(body, k, asked["boundary"], len(incidences))
+    options: dict[str, Any] = dict(asked)
     flow: Flow | Surface
     if why_no_rays(body) or asked["method"] == "t-matrix":
         flow = body

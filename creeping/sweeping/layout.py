@@ -97,7 +97,7 @@ def write_empty(folder: Path, plan: SweepPlan, unit: str | None = None) -> dict[
         "coordinates": list(beside),
         "unit": unit,
         "attributes": attributes,
-        "unchanging": unchanging_digest(folder, list(beside)),
+        "unchanging": unchanging_digest(folder, list(request.variables), list(beside)),
     }
 
 
@@ -143,16 +143,21 @@ def _write_group(folder: Path, attributes: dict[str, Any]) -> None:
         aside.write_text(json.dumps({"attributes": attributes, "zarr_format": 3, "node_type": "group"}))
 
 
-def unchanging_digest(folder: Path, beside: list[str]) -> str:
+def unchanging_digest(folder: Path, variables: list[str], beside: list[str]) -> str:
     """Digest of what describes the arrays, and of the coordinates ``beside`` them: names and bytes of the files.
+
+    Other arrays, and files that a system or a viewer leaves, are nobody's business.
 
     Raises
     ------
     OSError
         If one cannot be read.
     """
-    files = [path for path in folder.glob(f"*/{ROOT}") if path.parent.name != STUDY]
-    files += [path for name in beside for path in folder.glob(f"{name}/c/**/*") if path.is_file()]
+    files = [folder / name / ROOT for name in (*variables, *beside, STATUS, ERRORS)]
+    for name in beside:
+        chunks = folder / name / "c"
+        numbered = (path for path in chunks.rglob("*") if all(map(str.isdigit, path.relative_to(chunks).parts)))
+        files += [path for path in numbered if path.is_file()]
     found = {
         path.relative_to(folder).as_posix(): hashlib.blake2b(bytes_of(path, MOST_DOCUMENT)).hexdigest()
         for path in files

@@ -125,6 +125,8 @@ def sweep_attributes(plan: SweepPlan, unit: str) -> dict[str, Any]:
         words |= {"boundaries": ", ".join(request.boundaries), "order_of_creeping_waves": int(request.order)}
         if request.method == "t-matrix":
             words["served_by"] = request.method
+        elif flow["kind"] == "none":
+            words["served_by"] = "equation"
         elif is_piecewise(plan.body):
             # as `creeping.FarField.method` says it of what rays alone do not serve
             words["served_by"] = "rays+optics"

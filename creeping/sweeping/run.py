@@ -75,7 +75,8 @@ def sweep_directions(
         Wavenumbers of the fields.
     quantity : {"monostatic", "bistatic", "rays"}
         "monostatic": field back towards the source. "bistatic": field in the directions ``observation``. "rays": the
-        rays themselves. All results include data of the shadow line: curves, length, shares.
+        rays themselves. All results include data of the shadow line: curves, length, shares; NaN where no rays are
+        launched, as by the T-matrix, or where the equation alone serves a body with edges.
     observation : (m, 3), optional
         Directions of observation for "bistatic".
     boundary : {"soft", "hard", "pec"}, ImpedanceBoundary or a list of them
@@ -117,7 +118,8 @@ def sweep_directions(
     Returns
     -------
     xarray.Dataset
-        ``incidence_status`` marks incidences that are singular or failed; these raise no error.
+        ``incidence_status`` marks incidences that are singular or failed; these raise no error. Fields of singular
+        ones are those of the equation, NaN by rays alone or where it costs too much.
 
     Raises
     ------
@@ -137,6 +139,8 @@ def sweep_directions(
     if why_no_rays(flow):
         if quantity == "rays":
             raise InvalidInputError(rays_refused(flow))
+        if accuracy is not None:
+            raise InvalidInputError(f"accuracy= is of fields by rays: leave it out; {rays_refused(flow)}")
         flow, method = NoFlow(flow), method or "auto"
     elif method == "t-matrix":
         flow = NoFlow(getattr(flow, "body", flow))

@@ -5,7 +5,8 @@ zarr compares. Chunks are written aside and renamed, and ``task_status`` of a ta
 failed incidences) after all its chunks: what is marked is whole, whenever a writer dies. The group ``study`` holds what
 the results depend on, with a digest, the digest of the files that stay the same from the beginning to the end
 (descriptions of the arrays, and coordinates), and the flow. Datasets are given if these agree and the chunks of done
-tasks are there; `SweepStore.verify` reads them. CRCs and digests have no key: they tell of accidents, not of forgery.
+tasks are there; `SweepStore.verify` reads them. CRCs and digests have no key: they tell of accidents, not of forgery,
+nor of a chunk that was copied over another.
 
 What stays the same follows from the plan: `mended` writes it anew where it is damaged.
 """
@@ -324,7 +325,8 @@ class SweepStore:
 
     def _is_described(self) -> bool:
         try:
-            return unchanging_digest(self.folder, self.content["coordinates"]) == str(self.content["unchanging"])
+            found = unchanging_digest(self.folder, self.variables, self.content["coordinates"])
+            return found == str(self.content["unchanging"])
         except OSError:
             return False
 

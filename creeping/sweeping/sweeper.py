@@ -23,7 +23,7 @@ from creeping.errors import InvalidInputError, SingularIncidenceError, SurfaceEr
 from creeping.field.arguments import UNRESOLVED
 from creeping.field.boundary import BoundaryLike, parse_boundary
 from creeping.field.currents.whole_body import far_by_currents
-from creeping.field.equation.solving import POOR, solution_for, solve_together, solved_alone
+from creeping.field.equation.solving import POOR, asked_solution, solution_for, solve_together, solved_alone
 from creeping.field.far import far_field
 from creeping.field.problem import Problem
 from creeping.field.results.far_result import FarField
@@ -286,15 +286,19 @@ class Sweeper:
 
     def _fill_without_lines(self, incidences: FloatArray, rows: IntArray, out: Arrays) -> None:
         """Fields of incidences whose lines cross themselves, by the equation if it costs little enough; else none."""
-        observers = self._observers(incidences)
+        observers, asked = self._observers(incidences), self.request.method == "equation"
         for case in self._cases() if len(rows) else ():
             (_, wavenumber), (name, _, _) = case
             boundary = parse_boundary(name)
-            solve_together(self.body, incidences[rows], wavenumber, boundary)
+            solve_together(self.body, incidences[rows], wavenumber, boundary, fine=asked)
             for row in rows:
-                if solved := solution_for(self.body, incidences[row], wavenumber, boundary):
-                    field = solved.solution.far_field(observers[row], solved.incidence)
-                    self._put(out, [row], case, FieldArrays.of(field, 1).arrays)
+                # what costs too much, or has no mesh, stays NaN and unresolved
+                with suppress(InvalidInputError, SurfaceError):
+                    find = asked_solution if asked else solution_for
+                    solved = find(self.body, incidences[row], wavenumber, boundary)
+                    if solved:
+                        field = solved.solution.far_field(observers[row], solved.incidence)
+                        self._put(out, [row], case, FieldArrays.of(field, 1).arrays)
 
     def _fan(self, direction: FloatArray, line: ShadowLine | None = None) -> RayFan:
         line, request = line or shadow_line(self.body, direction), self.request

@@ -123,3 +123,12 @@ def test_a_chunk_lost_after_opening_is_told(whole, tmp_path):
         dataset["creeping"].load()
     store = open_store(PLAN, folder, resume=True)
     assert store.missing() == [2]
+
+
+@pytest.mark.filterwarnings("ignore:Object at")
+def test_what_others_leave_in_a_store_is_no_damage(whole, tmp_path):
+    shutil.copytree(whole[0], tmp_path / "s")
+    for name in (".DS_Store", "direction/c/.nfs0001", "direction/.sync"):
+        (tmp_path / "s" / name).write_text("of a viewer")
+    xarray.Dataset({"mine": ("x", [1.0, 2.0])}).to_zarr(tmp_path / "s", mode="a", consolidated=False)
+    same(SweepStore.open(tmp_path / "s").dataset(), whole[1])

@@ -91,3 +91,13 @@ def test_an_echo_goes_on_the_way_it_was_begun(tmp_path, monkeypatch):
                 patch.setattr(f"creeping.sweeping.{room}.by_equation_alone", lambda *_, now=not alone, **__: now)
             again = cr.bistatic(sc.Cylinder(0.5, 1.0), store=tmp_path / str(alone), resume=True, **asked)
         assert again.identical(first)
+
+
+@pytest.mark.slow
+def test_backscatter_goes_on_by_the_method_it_was_begun_with(tmp_path, monkeypatch):
+    asked = {"wavenumbers": 3.0, "azimuth": [0.0, 30.0], "boundary": "hard", "cache": False, "store": tmp_path / "s"}
+    with monkeypatch.context() as patch:
+        patch.setattr("creeping.sweeping.echoes.pays", lambda *_: False)
+        first = cr.backscatter(sc.Cylinder(0.5, 1.0), **asked)
+    monkeypatch.setattr("creeping.sweeping.echoes.pays", lambda *_: True)
+    assert cr.backscatter(sc.Cylinder(0.5, 1.0), resume=True, **asked).identical(first)

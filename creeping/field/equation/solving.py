@@ -216,7 +216,7 @@ def solved_alone(
     if plan.refused:
         raise (InvalidInputError if plan.nodes else SurfaceError)(
             f"the integral equation is not solved at wavenumber {wavenumber:g}: {plan.refused}; give a lower "
-            "frequency, or a coarser mesh"
+            "frequency, a coarser mesh, or more memory (CREEPING_MEMORY)"
         )
     tell(f"{plan.nodes} nodes, about {plan.seconds:.2g} s and {plan.memory / 1e9:.2g} GB: integrals between the nodes")
     return _solved(body, directions, wavenumber, boundary, plan.effort, tell, keep)
