@@ -34,7 +34,12 @@ def test_one_and_two_workers_and_none_give_the_same_bytes(two, tmp_path):
     stores = {name: SweepStore.create(tmp_path / f"{name}.zarr", plan) for name in ("none", "one", "two")}
     fill(plan, stores["none"])
     in_flight = []
-    fill(plan, stores["two"], client=two, progress=lambda *_: in_flight.append(len(two.futures)))
+
+    def count(*_):
+        # results that have been told are released by and by
+        in_flight.append(sum(one.status == "pending" for one in list(two.futures.values())))
+
+    fill(plan, stores["two"], client=two, progress=count)
     # and by the address, as of a scheduler elsewhere
     import distributed
 
@@ -44,7 +49,7 @@ def test_one_and_two_workers_and_none_give_the_same_bytes(two, tmp_path):
     assert len(first) > 14 * len(plan.request.variables)
     assert first == fake.bytes_of(stores["one"].folder) == fake.bytes_of(stores["two"].folder)
     assert set(two.run(os.getenv, "CREEPING_THREADS").values()) == {"1"}
-    assert len(in_flight) == 14 and max(in_flight) <= 2 * cluster.AHEAD + 1
+    assert len(in_flight) == 14 and 0 < max(in_flight) <= 2 * cluster.AHEAD
 
 
 @pytest.mark.slow
