@@ -159,6 +159,9 @@ def blocks_of(matrix: Matrix, mirrors: Mirrors) -> np.ndarray:
 
     def add(at: IntArray, rows: np.ndarray, factor: complex) -> None:
         """Rows of the matrix, added up over images: sums and differences, one flip after the other."""
+        if len(out) == 1:
+            out[0][at] += np.complex64(factor) * rows
+            return
         for first in range(0, len(rows), FEW):
             some = rows[first : first + FEW]
             each = [some[:, order] * sign for order, sign in zip(columns, signs, strict=True)]

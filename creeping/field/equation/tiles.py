@@ -11,7 +11,7 @@ Sources: [DR84, sec. 2.7]; Derivations, F36.
 
 from dataclasses import dataclass
 from functools import cache, cached_property
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 from scipy.special import roots_jacobi
@@ -173,10 +173,9 @@ class Tiles:
         from scipy.spatial import cKDTree
 
         reach = NEAR if self.p >= POINTS - 1 else NEAR_FEW
-        lists = cKDTree(points).query_ball_point(self.middles, reach * self.sizes)
-        counts = np.array([len(one) for one in lists], dtype=np.int64)
-        targets = np.concatenate([np.sort(one) for one in lists]).astype(np.int64) if counts.any() else counts[:0]
-        return np.concatenate([[0], np.cumsum(counts)]), targets
+        lists = cKDTree(points).query_ball_point(self.middles, reach * self.sizes, return_sorted=True)
+        starts = np.concatenate([[0], np.cumsum([len(one) for one in lists])]).astype(np.int64)
+        return starts, np.fromiter(chain.from_iterable(lists), np.int64, starts[-1])
 
     def rows(
         self,
