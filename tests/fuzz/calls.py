@@ -321,7 +321,6 @@ def _calls_of_fields(made: dict[str, Any]) -> dict[str, Call]:
         "body_uncertainty": (cr.body_uncertainty, {"fan": fan, "n_rays": 8}),
         "validity": (cr.validity, {"fan": fan, "wavenumber": 12.0}),
         "ImpedanceBoundary": (cr.ImpedanceBoundary, {"admittance": 0.5}),
-        "SurfaceCurrents.changed": (currents.changed, {"points": [(0.0, 0.0, 0.8)]}),
         "SurfaceCurrents.error": (currents.error, {"directions": looks}),
         "SurfaceCurrents.far": (currents.far, {"directions": looks}),
         "SurfaceCurrents.scattered": (currents.scattered, {"points": outside}),
