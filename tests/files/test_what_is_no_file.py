@@ -41,7 +41,7 @@ def test_others_do_not_wait(no_file):
     described = no_file.with_name("zarr.json")
     os.rename(no_file, described)
     with pytest.raises(OSError, match="no regular file"):
-        unchanging_digest(no_file.parent.parent, [])
+        unchanging_digest(no_file.parent.parent, [no_file.parent.name], [])
     os.rename(described, no_file)
     for kind, name in ((Mesh, "b.stl"), (Cad, "b.step")):
         os.rename(no_file, name)
