@@ -14,6 +14,7 @@ from typing import Any, assert_type
 found = cr.coupling(body, [(0, 0, 1), (0.5, 0, 0)], wavenumber=30.0)
 assert_type(found[0, 1], np.complex128)
 assert_type(found[0][1], Any)
+assert_type(cr.coupling(body, [(0, 0, 1), (0.5, 0, 0)], wavenumber=[30.0, 31.0]), list[cr.Coupling])
 """
 WRONG = {
     'cr.launch(flow, line, wavenumber="40")': "arg-type",

@@ -252,6 +252,19 @@ def test_changes_of_the_path_are_those_of_its_reverse(both):
     assert compared > 10
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_several_wavenumbers_are_one_after_another(kind):
+    places = on_sphere(np.array([30.0, 75.0]))
+    found = coupled(kind, sc.Sphere(), places, ACROSS, wavenumber=[20.0, 25.0])
+    for k, one in zip([20.0, 25.0], found, strict=True):
+        alone = coupled(kind, sc.Sphere(), places, ACROSS, wavenumber=k)
+        assert one.wavenumber == k and np.array_equal(one.values, alone.values)
+        assert np.array_equal(one.error, alone.error)
+    assert coupled(kind, sc.Sphere(), places, ACROSS, wavenumber=np.array([])) == []
+    with pytest.raises(cr.InvalidInputError, match="-1"):
+        coupled(kind, sc.Sphere(), places, ACROSS, wavenumber=[20.0, -1.0])
+
+
 def test_rotated_sphere_is_the_same():
     ports, q = on_sphere(np.array([30.0, 75.0, 110.0])), np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
     axes = ACROSS + np.cross(ACROSS, ports)

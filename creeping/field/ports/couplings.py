@@ -11,7 +11,8 @@ Sources: [PW81], [P82]; Derivations, F25, F28, F33 and F34.
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Sequence
+from typing import Literal, overload
 
 import numpy as np
 
@@ -42,17 +43,39 @@ NEAR = 2.0
 """How far from a caustic a port is close to it, in terms of (a/k^2)^(1/3)."""
 FLAT = 1e-3
 """Least tangential part of an axis, as a share of it: below it is rounding of the normal, not a direction."""
+Length = float | Literal["auto"]
+Wavenumbers = Sequence[float] | FloatArray
 
 
+@overload
 def coupling(
     body: Surface,
     ports: ArrayLike,
     *,
     wavenumber: float,
+    boundary: BoundaryLike = ...,
+    order: int = ...,
+    length: Length = ...,
+) -> Coupling: ...
+@overload
+def coupling(
+    body: Surface,
+    ports: ArrayLike,
+    *,
+    wavenumber: Wavenumbers,
+    boundary: BoundaryLike = ...,
+    order: int = ...,
+    length: Length = ...,
+) -> list[Coupling]: ...
+def coupling(
+    body: Surface,
+    ports: ArrayLike,
+    *,
+    wavenumber: float | Wavenumbers,
     boundary: BoundaryLike = "hard",
     order: int = 2,
-    length: float | Literal["auto"] = AUTO,
-) -> Coupling:
+    length: Length = AUTO,
+) -> Coupling | list[Coupling]:
     """Matrix of fields u between ports on a hard body: a unit point source e^{ikr}/(4 pi r) at one, u at another.
 
     Parameters
@@ -61,7 +84,8 @@ def coupling(
         Smooth and without a speed.
     ports : (n, 3), L
         On the body, two or more.
-    wavenumber : float, 1/L
+    wavenumber : float or (f,), 1/L
+        Several give a list, one matrix for each.
     boundary : "hard"
         Only "hard" is supported. On a soft body the field is 0.
     order : 2 or 1
@@ -95,20 +119,28 @@ def coupling(
     >>> np.abs(u[0, 1:]).round(4).tolist(), bool(np.all(u[0, 1:] == u[1:, 0]))
     ([0.1065, 0.0173], True)
     """
-    k = checked_wave(body, wavenumber, order, "ports", boundary)
+    k = _checked_waves(body, wavenumber, order, "ports", boundary)
     y = _checked_ports(body, ports)
     return _coupled(body, y, None, ["point"] * len(y), k, order, length, boundary_name(boundary))
 
 
+@overload
+def slot_coupling(
+    body: Surface, ports: ArrayLike, axes: ArrayLike, *, wavenumber: float, order: int = ..., length: Length = ...
+) -> Coupling: ...
+@overload
+def slot_coupling(
+    body: Surface, ports: ArrayLike, axes: ArrayLike, *, wavenumber: Wavenumbers, order: int = ..., length: Length = ...
+) -> list[Coupling]: ...
 def slot_coupling(
     body: Surface,
     ports: ArrayLike,
     axes: ArrayLike,
     *,
-    wavenumber: float,
+    wavenumber: float | Wavenumbers,
     order: int = 2,
-    length: float | Literal["auto"] = AUTO,
-) -> Coupling:
+    length: Length = AUTO,
+) -> Coupling | list[Coupling]:
     """Matrix of fields between slots in a perfect conductor: H along one, of a unit magnetic dipole along another.
 
     A slot of length dl and voltage V (its field integrated across the slot) is a magnetic moment V dl along the slot.
@@ -125,7 +157,8 @@ def slot_coupling(
         On the body, two or more, no two at the same point.
     axes : (n, 3) or (3,)
         Directions of the slots, of any length; only the tangential components are used.
-    wavenumber : float, 1/L
+    wavenumber : float or (f,), 1/L
+        Several give a list, one matrix for each.
     order : 2 or 1
     length : float or "auto", L
         As for `coupling`.
@@ -156,19 +189,27 @@ def slot_coupling(
     >>> np.abs(abreast[0, 1:]).round(3).tolist(), np.abs(in_line[0, 1:]).round(3).tolist()
     ([3.76, 0.689], [0.256, 0.022])
     """
-    k = checked_wave(body, wavenumber, order, "slots")
+    k = _checked_waves(body, wavenumber, order, "slots")
     y = _checked_ports(body, ports)
     return _coupled(body, y, axes, ["slot"] * len(y), k, order, length)
 
 
+@overload
+def monopole_coupling(
+    body: Surface, ports: ArrayLike, *, wavenumber: float, order: int = ..., length: Length = ...
+) -> Coupling: ...
+@overload
+def monopole_coupling(
+    body: Surface, ports: ArrayLike, *, wavenumber: Wavenumbers, order: int = ..., length: Length = ...
+) -> list[Coupling]: ...
 def monopole_coupling(
     body: Surface,
     ports: ArrayLike,
     *,
-    wavenumber: float,
+    wavenumber: float | Wavenumbers,
     order: int = 2,
-    length: float | Literal["auto"] = AUTO,
-) -> Coupling:
+    length: Length = AUTO,
+) -> Coupling | list[Coupling]:
     """Matrix of fields between monopoles on a perfect conductor: E along n at one, of a unit moment at another.
 
     A short monopole of height h with uniform current I is an electric moment I h along the normal. Values are E along
@@ -182,7 +223,8 @@ def monopole_coupling(
         Smooth and without a speed.
     ports : (n, 3), L
         On the body, two or more, no two at the same point.
-    wavenumber : float, 1/L
+    wavenumber : float or (f,), 1/L
+        Several give a list, one matrix for each.
     order : 2 or 1
     length : float or "auto", L
         As for `coupling`.
@@ -211,11 +253,12 @@ def monopole_coupling(
     >>> np.abs(E[0, 1:]).round(3).tolist(), bool(np.all(E[0, 1:] == E[1:, 0]))
     ([4.083, 0.752], True)
     """
-    k = checked_wave(body, wavenumber, order, "monopoles")
+    k = _checked_waves(body, wavenumber, order, "monopoles")
     y = _checked_ports(body, ports)
     return _coupled(body, y, None, ["monopole"] * len(y), k, order, length)
 
 
+@overload
 def antenna_coupling(
     body: Surface,
     slots: ArrayLike,
@@ -223,9 +266,30 @@ def antenna_coupling(
     monopoles: ArrayLike,
     *,
     wavenumber: float,
+    order: int = ...,
+    length: Length = ...,
+) -> Coupling: ...
+@overload
+def antenna_coupling(
+    body: Surface,
+    slots: ArrayLike,
+    axes: ArrayLike,
+    monopoles: ArrayLike,
+    *,
+    wavenumber: Wavenumbers,
+    order: int = ...,
+    length: Length = ...,
+) -> list[Coupling]: ...
+def antenna_coupling(
+    body: Surface,
+    slots: ArrayLike,
+    axes: ArrayLike,
+    monopoles: ArrayLike,
+    *,
+    wavenumber: float | Wavenumbers,
     order: int = 2,
-    length: float | Literal["auto"] = AUTO,
-) -> Coupling:
+    length: Length = AUTO,
+) -> Coupling | list[Coupling]:
     """Matrix of fields between slots in, and monopoles on, a perfect conductor, for unit moments.
 
     Ports are numbered slots first, then monopoles. Row i is the source: a magnetic moment V dl along a slot
@@ -250,7 +314,8 @@ def antenna_coupling(
         Directions of the slots, of any length; only the tangential components are used.
     monopoles : (m, 3), L
         On the body, one or more; no two ports at the same point.
-    wavenumber : float, 1/L
+    wavenumber : float or (f,), 1/L
+        Several give a list, one matrix for each.
     order : 2 or 1
     length : float or "auto", L
         As for `coupling`.
@@ -282,7 +347,7 @@ def antenna_coupling(
     >>> found.kinds.tolist()
     ['slot', 'monopole', 'monopole']
     """
-    k = checked_wave(body, wavenumber, order, "antennas")
+    k = _checked_waves(body, wavenumber, order, "antennas")
     parts = [as_points(given) for given in (slots, monopoles)]
     shapes = [part.shape for part in parts]
     if any(part.ndim != 2 or not len(part) for part in parts):
@@ -292,6 +357,15 @@ def antenna_coupling(
         )
     y = _checked_ports(body, np.concatenate(parts))
     return _coupled(body, y, axes, ["slot"] * len(parts[0]) + ["monopole"] * len(parts[1]), k, order, length)
+
+
+def _checked_waves(
+    body: Surface, wavenumber: float | Wavenumbers, order: int, what: str, boundary: BoundaryLike = "hard"
+) -> float | list[float]:
+    """One wavenumber or a list of them, each checked."""
+    if isinstance(wavenumber, str) or np.ndim(wavenumber) != 1:
+        return checked_wave(body, wavenumber, order, what, boundary)  # type: ignore[arg-type]
+    return [checked_wave(body, one, order, what, boundary) for one in real_array(wavenumber, "wavenumber").tolist()]
 
 
 def checked_wave(body: Surface, wavenumber: float, order: int, what: str, boundary: BoundaryLike = "hard") -> float:
@@ -346,14 +420,14 @@ def _tangential(axes: ArrayLike, normals: FloatArray) -> FloatArray:
 
 
 def port_geodesics(
-    body: Surface, ports: FloatArray, k: float, length: float | Literal["auto"], *, sources: int | None = None
+    body: Surface, ports: FloatArray, k: float, length: Length, *, sources: int | None = None
 ) -> PortRays:
     """All between ports (n, 3), L, up to a length, L; from the first so many, if not from all."""
     pad = float(NEAR * np.cbrt(size(body) / k**2))
     return rays_between(body, ports, _fan_length(body, k, length), pad=pad, sources=sources)
 
 
-def _fan_length(body: Surface, k: float, length: float | Literal["auto"]) -> float:
+def _fan_length(body: Surface, k: float, length: Length) -> float:
     """Length of geodesics, L: "auto" is by the decay of the first mode at the root mean square curvature."""
     if not (isinstance(length, str) and length == AUTO):
         return positive_number(length, "length")
@@ -369,12 +443,15 @@ def _coupled(
     ports: FloatArray,
     axes: ArrayLike | None,
     kinds: list[str],
-    k: float,
+    k: float | list[float],
     order: int,
-    length: float | Literal["auto"],
+    length: Length,
     boundary: str = "pec",
-) -> Coupling:
-    """The matrix of ports of given kinds, slots first, which have axes."""
+) -> Coupling | list[Coupling]:
+    """The matrix of ports of given kinds, slots first, which have axes; of several wavenumbers a list."""
+    if isinstance(k, list):
+        # geodesics take a small part of the time: each wave traces its own, of the length that it needs
+        return [_coupled(body, ports, axes, kinds, one, order, length, boundary) for one in k]  # type: ignore[misc]
     named, n = np.array(kinds), len(ports)
     slots = named == "slot"
     # checked before fans are traced
