@@ -37,8 +37,9 @@ LEAST_STEPS, MOST_STEPS = 3, 10
 """Steps of GMRES from the currents of optics on: fewer serve no one, and more change nothing that coarse tiles know."""
 FEWEST = 10.0
 """Nodes that a square wavelength has at least: 12 by the widest of coarse rules, squares of 2 x 2 nodes, less SLACK."""
-PER_NODE, PER_SQUARE = 1.4e-4, 1.4e-5
-"""Seconds of a core that integrals over tiles near to a node take, and more for each node of a tile."""
+PER_NODE, PER_PAIR, FEWEST_PAIRS = (2.5e-5, 3e-6), (1.2e-6, 4e-7), 7.0
+"""Seconds of a core that integrals take of a node, and of each tile near it, and more of both for each node of a tile;
+tiles near to a node at least, as on a sphere (tests/benchmarks/test_forecast.py)."""
 NEAR_CURVED, NEAR_FLAT = 2.3, 1.3
 """What those of a conductor take of that, by whether tiles are curved."""
 PER_ENTRY = 4e-10
@@ -102,7 +103,7 @@ def plan_of(
 def _plan(body: Surface, wavenumber: float, kind: Boundary, allowed: float, incidences: int, together: bool) -> Plan:
     columns, asked = incidences * kind_columns(kind), (incidences if together else 1) * kind_columns(kind)
     fewest = int(FEWEST * _area(body) * (wavenumber / (2 * np.pi)) ** 2)
-    least = near_seconds(fewest, 1, kind, flat=True)
+    least = near_seconds(fewest, FEWEST_PAIRS * fewest, 1, kind, flat=True)
     plan = Plan(fewest, least, 0.0, f"at least {fewest} nodes take about {least:.2g} s, more than {allowed:g}")
     for coarse in (False, True) if least <= allowed else ():
         load = load_of(body, wavenumber, kind, coarse=coarse)
@@ -146,10 +147,11 @@ def kind_columns(kind: Boundary) -> int:
     return 2 if kind.kind == "conductor" else 1
 
 
-def near_seconds(nodes: float, p: int, kind: Boundary, *, flat: bool) -> float:
-    """Seconds of integrals over tiles of p x p nodes near to the nodes and to the points beneath them."""
+def near_seconds(nodes: float, pairs: float, p: int, kind: Boundary, *, flat: bool) -> float:
+    """Seconds of integrals over tiles of p x p nodes near to nodes and to the points beneath them, in so many pairs."""
     vector = (NEAR_FLAT if flat else NEAR_CURVED) if kind.kind == "conductor" else 1.0
-    return nodes * (PER_NODE + PER_SQUARE * p**2) * vector / thread_count()
+    node, pair = (first + more * p**2 for first, more in (PER_NODE, PER_PAIR))
+    return 2 * (nodes * node + pairs * pair) * vector / thread_count()
 
 
 def _area(body: Surface) -> float:
@@ -181,9 +183,10 @@ def pair_seconds(nodes: int, kind: Boundary) -> float:
 def load_on(tiles: Tiles, wavenumber: float, kind: Boundary) -> Load:
     """What the equation takes on tiles."""
     nodes, vector = len(tiles.points), kind.kind == "conductor"
-    near = near_seconds(nodes, tiles.p, kind, flat=tiles.planar)
+    near = near_seconds(nodes, tiles.near_pairs, tiles.p, kind, flat=tiles.planar)
     entries = float(nodes) ** 2 * (4 if vector else 1)
-    parts = len(mirrors_of(tiles, kind).images)
+    # signs of three coordinates make eight parts at most
+    parts = len(mirrors_of(tiles, kind).images) if is_dense(nodes, kind, 8) else 1
     whole = matrix_bytes(nodes, kind, parts)
     if is_dense(nodes, kind, parts):
         once = (near + pair_seconds(nodes, kind)) / parts
@@ -193,7 +196,8 @@ def load_on(tiles: Tiles, wavenumber: float, kind: Boundary) -> Load:
     # as many points beneath the nodes
     places = np.concatenate([tiles.points, tiles.points])
     best = best_split(lambda a: SmoothKernel(wavenumber, widths, a), places, tiles.points, load, np.inf)
-    sparse = 2e4 * nodes * (4 if vector else 1) * max(tiles.p, 2) ** 2 / 25
+    # entries of 12 bytes at the nodes and beneath them, and once more of one of both while they are put together
+    sparse = 3 * 12.0 * tiles.near_pairs * tiles.p**2 * (4 if vector else 1)
     if best is None:
         return Load(nodes, near, near, np.inf, whole, parts)
     # a split sum of a conductor is of two columns
