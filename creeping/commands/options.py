@@ -15,11 +15,6 @@ Body = Annotated[
 ]
 SpeedOption = Annotated[str | None, Parameter(help="Speed c(x, y, z) of the weighted flow, e.g. '1 + x'.")]
 OUTPUT, FIELD, ANGLES = Group("Output"), Group("Field"), Group("Angles")
-Frequency = Annotated[str | None, Parameter(group=FIELD, help='Instead of k, e.g. "10GHz": lengths are metres then.')]
-Wavelength = Annotated[str | None, Parameter(group=FIELD, help='Instead of k, e.g. "3cm".')]
-SoundSpeed = Annotated[
-    float | None, Parameter(group=FIELD, help="With a frequency: of the medium, m/s; that of light if not given.")
-]
 Json = Annotated[bool, Parameter(name="--json", negative="", group=OUTPUT, help="Print as JSON.")]
 Pictures = Annotated[bool, Parameter(group=OUTPUT, help="Draw pictures; --no-pictures leaves them out.")]
 Formats = Annotated[
@@ -31,6 +26,24 @@ Resume = Annotated[
     bool,
     Parameter(negative="", help="Go on with what a run that was ended has left in the folder of the results."),
 ]
+
+
+@Parameter(name="*", group=FIELD)
+@dataclass(frozen=True)
+class WaveOptions:
+    """The wave that a field is asked for by."""
+
+    wavenumber: Annotated[float | None, Parameter(help="k, 1/L: asks for the field.")] = None
+    frequency: Annotated[
+        str | None, Parameter(help='Instead of k, e.g. "10GHz": lengths are metres then. Of coupling also a band.')
+    ] = None
+    wavelength: Annotated[str | None, Parameter(help='Instead of k, e.g. "3cm".')] = None
+    sound_speed: Annotated[
+        float | None, Parameter(help="With a frequency: of the medium, m/s; that of light if not given.")
+    ] = None
+
+
+NO_WAVE = WaveOptions()
 
 
 @Parameter(name="*")

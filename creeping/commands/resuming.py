@@ -84,6 +84,11 @@ class Unfinished:
             write()
             self._shown = time.monotonic()
 
+    def write_missing(self, done: int, count: int, file: str) -> None:
+        """Write the summary of a file that lacks rows."""
+        missing = {"values_done": done, "values": count, "resume": self.again, "files": [file, SUMMARY]}
+        self.write_summary(missing, complete=False)
+
     def write_summary(self, summary: dict[str, Any], *, complete: bool) -> None:
         """Write the summary file, without the seconds, which are those of one run; the parts go when all is written."""
         from creeping.files import write_text

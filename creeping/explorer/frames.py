@@ -30,8 +30,7 @@ from creeping.geometry.directions import directions_from_angles
 from creeping.geometry.evaluators import speed_of
 from creeping.geometry.surface import Surface
 from creeping.geometry.triangulation import Triangulation
-from creeping.plotting.coloured_body import current_levels
-from creeping.plotting.field_pictures import levels_of, surface_values
+from creeping.plotting.coloured_body import current_levels, levels_of, surface_values
 from creeping.rays.fan import RayFan, end_error, launch
 from creeping.rays.isophase import IsoPhaseCurve, iso_phase_curves
 from creeping.rays.transport import Flow

@@ -370,13 +370,6 @@ def scalar_on_body(field: PointValues, points: FloatArray, unit: float, facts: d
     return SurfaceField(values=values, lit=lit, creeping=creeping, **stated([field], points, unit), **facts)
 
 
-def zero_field(count: int, method: str) -> PointValues:
-    """The field 0, exactly: u on a soft body."""
-    nothing = np.zeros(count, dtype=complex)
-    status = np.full(count, int(FieldStatus.OK), dtype=np.int64)
-    return PointValues(nothing, nothing, np.zeros(count), np.full(count, "expansion"), status, np.full(count, method))
-
-
 def measured_field(
     values: ComplexArray, error: FloatArray, method: str, error_by: str = "extinction", lit: BoolArray | None = None
 ) -> PointValues:
