@@ -8,7 +8,7 @@ import scatterers as sc
 from creeping.field.equation import effort
 from creeping.geometry.quadrature import body_nodes
 from studies.accuracy.bodies import DIPOLE_DEPTHS, bodies
-from studies.accuracy.joints import CASES, spread
+from studies.accuracy.edges import CASES, spread
 from tests.reference import dipoles, fundamental, sphere, stored
 from tests.reference.generatrix import pieces_profile
 from tests.reference.modal_conductor import scatter_conductor
