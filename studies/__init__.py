@@ -15,7 +15,7 @@ from typing import Any
 from creeping._version import __version__
 
 FIGURES = {
-    "fig2-grid": "grid.six_charts",
+    "fig2-grid": "curves.six_charts",
     "fig3-circles": "curves.circles",
     "fig4-torus": "curves.torus",
     "fig5-weighted": "curves.weighted",

@@ -6,8 +6,7 @@ and of rays at their ends against direct integration.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from functools import cached_property
+from dataclasses import asdict, replace
 from typing import Literal
 
 import numpy as np
@@ -18,32 +17,13 @@ from creeping.geometry.evaluators import polar_frame
 from creeping.geometry.piecewise import drawn_mesh
 from creeping.geometry.surface import Surface, size
 from creeping.plotting import pictures, plot_line
-from creeping.plotting._drawing import Drawing, Mark, View, compose
-from creeping.plotting._strokes import ARROW_COLOUR, RAY_COLOUR, LevelColours, Stroke, closed, refined
+from creeping.plotting._drawing import Drawing, View, compose
+from creeping.plotting._strokes import RAY_COLOUR, LevelColours, Stroke, closed, refined
+from creeping.plotting.pages import add_bar
 
 SOURCE_COLOUR = "#c2185b"
 RAY_COUNT, CHECKED_RAYS = 32, 64
 """Rays of a fan that are drawn, and of a bundle that are traced again."""
-
-
-@dataclass(frozen=True)
-class Scene(Drawing):
-    """A body with curves and the triad of its axes; no wave, so no arrow of incidence."""
-
-    @cached_property
-    def frame(self) -> tuple[FloatArray, FloatArray]:
-        """Lower left and upper right corner (2,) of the picture, L."""
-        tips = [mark.foot + 1.4 * (mark.tip - mark.foot) for mark in self.triad]
-        return self.view.frame(np.concatenate([self.mesh.vertices, np.stack(tips)]), margin=0.02)
-
-    @cached_property
-    def triad(self) -> list[Mark]:
-        """Coordinate axes in the lower left corner of the body's box, where a round body leaves room."""
-        low, high = self.view.frame(self.mesh.vertices, margin=0.0)
-        length = 0.1 * float(np.max(high - low))
-        flat = self.view.project(length * np.eye(3))
-        foot = self._at(*(low - np.minimum(flat.min(axis=0), 0.0) - 0.05 * (high - low)))
-        return [Mark(name, foot, foot + length * unit) for name, unit in zip("xyz", np.eye(3), strict=True)]
 
 
 def draw_curves(
@@ -60,24 +40,10 @@ def draw_curves(
     source : (3,), L, optional
         A point to mark, where it is visible.
     """
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-    scene = Scene(body, np.zeros(3), view, *drawn_mesh(body, 80), list(strokes), LevelColours.of([]))
-    ax.computed_zorder = False
-    pictures._draw_body(ax, scene)
-    for stroke in scene.strokes:
-        pictures._draw_stroke(ax, scene, stroke)
-    ax.add_collection3d(
-        Poly3DCollection([mark.outline(view) for mark in scene.triad], facecolors=ARROW_COLOUR, linewidths=0, zorder=30)
-    )
-    for mark in scene.triad:
-        ax.text(*mark.label(view), mark.name, zorder=30, **mark.text)
+    drawing = Drawing(body, None, view, *drawn_mesh(body, 80), list(strokes), LevelColours.of([]))
+    pictures.draw(ax, drawing)
     if source is not None and view.visible(body, np.asarray(source, dtype=float)[None])[0]:
         ax.plot(*np.reshape(source, (3, 1)), "o", ms=4, color=SOURCE_COLOUR, mec="white", mew=0.6, zorder=25)
-    # 3-D axes are square; a wide body may use all of the place they were given
-    for artist in ax.collections:
-        artist.set_clip_on(False)
-    pictures._frame(ax, scene)
 
 
 def directions_at(body: Surface, point: FloatArray, angles: FloatArray) -> FloatArray:
@@ -111,12 +77,9 @@ def circle_strokes(points: FloatArray, levels: FloatArray, colours: LevelColours
 
 def add_level_bar(figure: Any, colours: LevelColours, levels: FloatArray, label: str, **place: Any) -> None:
     """Colour bar with the range of the levels; ``place`` as for ``Figure.colorbar``."""
-    bar = figure.colorbar(colours.mappable, **place)
-    bar.set_label(label, fontsize=8)
-    bar.ax.tick_params(labelsize=8, width=0.5)
+    bar = add_bar(figure, colours.mappable, label, fontsize=8, **place)
     bar.set_ticks(levels[1::2] if len(levels) > 8 else levels)
     bar.ax.hlines(levels, 0, 1, colors="white", linewidth=0.4)
-    bar.outline.set_linewidth(0.5)
 
 
 def plain_ticks(ax: Any, which: Literal["major", "both"] = "major") -> None:
@@ -143,15 +106,8 @@ def in_parameters(ax: Any, fan: cr.RayFan, curves: Sequence[cr.IsoPhaseCurve], u
 
 def add_legend(figure: Any, drawings: Sequence[Drawing]) -> None:
     """One legend under all panels, of whatever any of them shows."""
-    from matplotlib.lines import Line2D
-
     named = {stroke.label: stroke for drawing in drawings for stroke in drawing.strokes if stroke.label}
-    ordered = sorted(named.values(), key=lambda stroke: -stroke.rank)
-    handles = [
-        Line2D([], [], color=stroke.colour, lw=max(stroke.width, 0.9), alpha=stroke.alpha, label=stroke.label)
-        for stroke in ordered
-    ]
-    figure.legend(handles=handles, loc="lower center", ncols=len(handles), frameon=False, fontsize=8)
+    replace(drawings[0], strokes=list(named.values())).add_legend(figure, columns=len(named))
 
 
 def map_card(flow: cr.PhaseMap) -> dict[str, Any]:

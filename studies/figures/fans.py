@@ -9,6 +9,7 @@ import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, FloatArray
 from creeping.plotting._drawing import Drawing
+from creeping.plotting.pages import new_figure
 from studies.figures.drawing import (
     add_legend,
     add_level_bar,
@@ -44,13 +45,11 @@ def creeping(path: Path, quick: bool) -> dict[str, Any]:
     get paler every 10 dB (hard, k rho = 10) and end at 30 dB or their second caustic. A
     pole of the angles is the whole edge theta = 0 or 180 degrees: the shadow line of (1, 0, 0) passes through both.
     """
-    from matplotlib.figure import Figure
-
     incidences = ((1, 1, 1), (1, 0, 0))
     flow = cr.build_phase_map(TWISTED, tolerance=1e-4 if quick else 1e-6)
     lines = [cr.shadow_line(TWISTED, d) for d in incidences]
     fans = [cr.launch(flow, line, length=LENGTH, n_rays=64 if quick else 512) for line in lines]
-    figure = Figure(figsize=(7.8, 6.0), facecolor="white")
+    figure = new_figure((7.8, 6.0))
     drawings = []
     for row, (fan, d) in enumerate(zip(fans, incidences, strict=True)):
         bottom = 0.525 - 0.46 * row
@@ -72,14 +71,12 @@ def torus(path: Path, quick: bool) -> dict[str, Any]:
     ray grazes the body, so no creeping ray starts: on the right only attached points launch. Rays are drawn faint where
     they are detached. (theta, psi) as in x = ((R + r cos theta) cos psi, (R + r cos theta) sin psi, r sin theta).
     """
-    from matplotlib.figure import Figure
-
     launched = {"all": "all of the shadow line launches", "attached": "attached points launch"}
     flow = cr.build_phase_map(TORUS, tolerance=1e-4 if quick else 1e-6)
     line = cr.shadow_line(TORUS, (1, 1, 1))
     asked: dict[str, Any] = {"length": LENGTH, "n_rays": 64 if quick else 768}
     fans = [cr.launch(flow, line, launch_from=status, **asked) for status in launched]
-    figure = Figure(figsize=(8.4, 6.2), facecolor="white")
+    figure = new_figure((8.4, 6.2))
     drawings = []
     for column, (fan, text) in enumerate(zip(fans, launched.values(), strict=True)):
         left = 0.45 * column
@@ -142,9 +139,7 @@ def sources(path: Path, quick: bool) -> dict[str, Any]:
     arccos(a/R_s) from the source, and the front of eikonal sqrt(R_s^2 - a^2) + t the circle t/a behind it. From the
     height h on the axis of a torus both curves are circles: h sin theta - R cos theta = r.
     """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(8.2, 6.4), facecolor="white")
+    figure = new_figure((8.2, 6.4))
     drawings, fans, cards, errors = [], [], {}, {}
     cases: dict[str, tuple[Any, tuple[float, float, float]]] = {
         "twisted ellipsoid": (TWISTED, (0.9, 0.5, 0.9)),
