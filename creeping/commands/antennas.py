@@ -18,7 +18,7 @@ from cyclopts import Parameter
 
 from creeping._progress import Progress
 from creeping.commands import options
-from creeping.commands.body import parse_body, title_of
+from creeping.commands.options import parse_body, title_of
 
 Port = Annotated[
     list[str],

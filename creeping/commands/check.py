@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from creeping.commands import options
-from creeping.commands.body import CAD, MESHES, is_file, parse_body
+from creeping.commands.options import CAD, MESHES, is_file, parse_body
 
 Output = Annotated[
     Path | None, Parameter(name=["-o", "--output"], help="Folder for quality.png, a file's mesh where it is rough.")

@@ -13,15 +13,14 @@ from creeping import plotting
 from creeping._progress import Progress
 from creeping._typing import FloatArray
 from creeping._version import __version__
-from creeping.commands.body import title_of
 from creeping.commands.echo_request import EchoJob, EchoRequest
 from creeping.commands.forecast import boundary_words, forecast
+from creeping.commands.options import title_of
 from creeping.commands.resuming import SUMMARY, Unfinished, asked_for, begun, kept
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import parse_boundary
 from creeping.field.frequency import frequency
-from creeping.field.results.comparison import Comparison, compare
-from creeping.field.results.echo import LEVELS, Echo
+from creeping.field.results.comparison import LEVELS, Comparison, Echo, compare
 from creeping.field.results.impulse import RangeProfile, range_profile
 from creeping.field.tmatrix.patterns import Averages
 from creeping.files import averaged_levels, write_averages, write_echo, write_mat, write_profile

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from creeping._typing import FloatArray
-from creeping.commands.body import each_once
 from creeping.commands.forecast import cure_of, size_words
-from creeping.commands.options import EchoOptions, FileOptions
+from creeping.commands.options import EchoOptions, FileOptions, each_once
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import boundary_name, parse_boundary
 from creeping.field.frequency import frequency as frequency_of

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from cyclopts import Group, Parameter
 
 from creeping.commands import options
-from creeping.commands.body import is_file, parse_body, title_of
+from creeping.commands.options import is_file, parse_body, title_of
 
 _page = Group("Page")
 

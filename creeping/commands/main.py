@@ -21,7 +21,7 @@ from creeping.commands import explore as _explore_command
 from creeping.commands import options, resuming
 from creeping.commands import sweep as _sweep_command
 from creeping.commands import upkeep as _upkeep
-from creeping.commands.body import Output, each_once, flow_of, parse_body, title_of
+from creeping.commands.options import Output, each_once, flow_of, parse_body, title_of
 
 app = App(
     name="creeping",

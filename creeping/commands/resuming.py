@@ -151,7 +151,7 @@ def begun(output: Path, name: str, asked: dict[str, Any], *, resume: bool) -> Un
 
 
 def _read(path: Path) -> dict[str, Any] | None:
-    from creeping.storage.reading import bytes_of
+    from creeping.storage.atomic import bytes_of
 
     with suppress(OSError, ValueError, RecursionError):
         content = json.loads(bytes_of(path, 10_000_000))

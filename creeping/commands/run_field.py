@@ -9,9 +9,8 @@ import numpy as np
 
 from creeping import files, plotting
 from creeping._typing import ArrayLike, FloatArray
-from creeping.commands.body import Output, each_once, write_tables
 from creeping.commands.forecast import Forecast, asked_wavenumber, forecast, frequency_words, radar_of
-from creeping.commands.options import WaveOptions
+from creeping.commands.options import Output, WaveOptions, each_once, write_tables
 from creeping.commands.resuming import Unfinished
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.body_currents import cached_currents

@@ -11,8 +11,8 @@ import numpy as np
 from creeping import files, plotting
 from creeping._progress import Progress
 from creeping._version import __version__
-from creeping.commands.body import Output, write_tables
 from creeping.commands.forecast import boundary_words, frequency_words
+from creeping.commands.options import Output, write_tables
 from creeping.commands.resuming import Unfinished, kept
 from creeping.commands.run_field import DPI, Job
 from creeping.errors import InvalidInputError

@@ -14,7 +14,7 @@ from creeping._typing import ComplexArray, FloatArray
 from creeping._version import __version__
 from creeping.explorer.frames import Preview, Refined, requested_curves
 from creeping.explorer.request import ViewRequest, far_levels, far_name, wave_text
-from creeping.explorer.wave import ENDED, FIELD_COLOURS, LEVEL_COLOURS, WAVE_COLOURS, ColourTable, Span
+from creeping.explorer.scene import ENDED, FIELD_COLOURS, LEVEL_COLOURS, WAVE_COLOURS, Bytes, Span, coloured
 from creeping.field.results.comparison import shown_range
 from creeping.field.results.far_result import FarField
 from creeping.field.tmatrix.result import METHOD
@@ -119,7 +119,7 @@ def _plane(torus: bool, rays: Pieces, curves: list[tuple[float, Pieces]], lines:
     """Pieces (k, 2) of rays, of curves by the share of their level, and of lines by status: phi and theta, degrees."""
     axes = _Axes((-180, 180), (-180, 180) if torus else (180, 0), WIDTH if torus else 0.56 * WIDTH)
     parts = [axes.lines(rays, RAY_COLOUR, 0.5, 0.6)]
-    parts += [axes.lines(pieces, LEVEL_COLOURS.hexadecimal(share), 0.9) for share, pieces in curves]
+    parts += [axes.lines(pieces, _hex(LEVEL_COLOURS, share), 0.9) for share, pieces in curves]
     dashes = {"attached": "", "occluded": "6,2", "concave": "2,2"}
     parts += [axes.lines(p, STATUS_COLOURS[s], 1.8, dashes=dashes[s]) for s, p in lines.items()]
     return _picture("plane", axes.height, [*parts, _plane_frame(torus)])
@@ -278,7 +278,7 @@ def legend(frame: Preview, span: Span, *, still: bool = False, wave: bool = Fals
     if frame.request.spacing:
         rows.append(_bar("levels", LEVEL_COLOURS, ("0", "iso-phase curves: travel time", f"{frame.fan.length:.3g}")))
     line = dict(zip(("shadow line", "occluded", "concave"), STATUS_COLOURS.values(), strict=True))
-    rows.append(_keys(line | {"outline": RAY_COLOUR, "no ray": "#{:02x}{:02x}{:02x}".format(*ENDED)}))
+    rows.append(_keys(line | {"outline": RAY_COLOUR, "no ray": f"#{bytes(ENDED).hex()}"}))
     if not still:
         # handles, in the colours that they have on the page
         rows.append(_keys({"arc: tilts d": "#ff2060", "tilts d": "#20df80", "turns d about itself": "#2080ff"}))
@@ -287,15 +287,20 @@ def legend(frame: Preview, span: Span, *, still: bool = False, wave: bool = Fals
     return f'<svg id="bar" xmlns="http://www.w3.org/2000/svg" {box}>{placed}</svg>'
 
 
-def _bar(name: str, colours: ColourTable, words: tuple[str, str, str]) -> str:
+def _bar(name: str, colours: Bytes, words: tuple[str, str, str]) -> str:
     """A bar of colours with words below its lower end, middle and upper end."""
     stops = "".join(
-        f'<stop offset="{share:.2f}" stop-color="{colours.hexadecimal(share)}"/>' for share in np.linspace(0, 1, 9)
+        f'<stop offset="{share:.2f}" stop-color="{_hex(colours, share)}"/>' for share in np.linspace(0, 1, 9)
     )
     ends = zip(words, (8, 180, 352), ("start", "middle", "end"), strict=True)
     text = "".join(f'<text x="{x}" y="20" text-anchor="{anchor}" {_TEXT}>{word}</text>' for word, x, anchor in ends)
     fill = f'<defs><linearGradient id="{name}">{stops}</linearGradient></defs>'
     return f'{fill}<rect x="8" y="2" width="344" height="8" fill="url(#{name})"/>{text}'
+
+
+def _hex(table: Bytes, share: float) -> str:
+    """One colour as text."""
+    return f"#{coloured(table, np.array(share)).tobytes().hex()}"
 
 
 def _keys(colours: dict[str, str]) -> str:

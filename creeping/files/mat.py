@@ -24,7 +24,7 @@ from creeping.storage.atomic import written_aside
 
 if TYPE_CHECKING:
     from creeping.field.cut_result import FieldCut
-    from creeping.field.results.echo import Echo
+    from creeping.field.results.comparison import Echo
     from creeping.field.results.far_result import FarField
 
 

@@ -12,8 +12,7 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.results.comparison import cross_section_decibels, decibels
-from creeping.field.results.echo import LEVELS
+from creeping.field.results.comparison import LEVELS, cross_section_decibels, decibels
 from creeping.field.results.point_result import FieldStatus
 from creeping.files.polylines import polydata
 from creeping.geometry.checks import UNKNOWN, unit_of
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 
     from creeping.field.cut_result import FieldCut
     from creeping.field.ports.coupling_result import Coupling
-    from creeping.field.results.echo import Echo
+    from creeping.field.results.comparison import Echo
     from creeping.field.results.far_result import FarField
     from creeping.field.results.impulse import RangeProfile
 

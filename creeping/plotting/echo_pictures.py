@@ -13,8 +13,7 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.frequency import suited
-from creeping.field.results.comparison import decibels, shown_range
-from creeping.field.results.echo import LEVELS
+from creeping.field.results.comparison import LEVELS, decibels, shown_range
 from creeping.field.results.impulse import range_profile
 from creeping.field.tmatrix.patterns import degrees_of
 from creeping.geometry.directions import directions_from_azimuth_elevation
@@ -22,8 +21,7 @@ from creeping.plotting import pages
 from creeping.plotting.far_cuts import COMPONENTS, QUANTITIES, Curve, draw_curves, draw_cut, heights_of
 
 if TYPE_CHECKING:
-    from creeping.field.results.comparison import Comparison
-    from creeping.field.results.echo import Echo
+    from creeping.field.results.comparison import Comparison, Echo
     from creeping.field.results.impulse import ImpulseResponse, RangeProfile
     from creeping.field.tmatrix.result import TMatrix
 

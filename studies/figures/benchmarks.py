@@ -16,7 +16,7 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, FloatArray
-from creeping.field.results.echo import Echo
+from creeping.field.results.comparison import Echo
 from creeping.files import read_cut
 from creeping.plotting.pages import COLOURS, EXACT, new_figure
 from creeping.sweeping.echoes import echo_of

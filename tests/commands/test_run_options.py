@@ -9,8 +9,7 @@ from command_line import ran, table
 
 import creeping as cr
 from creeping.commands import run_field
-from creeping.commands.body import Output
-from creeping.commands.options import WaveOptions
+from creeping.commands.options import Output, WaveOptions
 from creeping.commands.resuming import Unfinished
 from creeping.errors import InvalidInputError
 from creeping.field.waves.forward import lobe_step
