@@ -25,9 +25,8 @@ import creeping as cr
 import scatterers as sc
 from creeping._typing import ComplexArray, FloatArray
 from scatterers.exact.profile import Arc, Line
-from studies import tables
+from studies import Row, main
 from studies.accuracy.bodies import kind_of, random_directions
-from studies.tables import Row
 from tests.reference import stored
 from tests.reference.cases import ADMITTANCE
 from tests.reference.revolution import Profile, capsule_profile, cone_sphere_profile, scatter_by_rings
@@ -179,4 +178,4 @@ def joints(names: Sequence[str] = tuple(CASES), wavenumbers: Sequence[float] = (
 
 
 if __name__ == "__main__":
-    tables.main((edged, joints), {"edged": {"count": 1}, "joints": {"names": list(CASES)[:1], "wavenumbers": (20.0,)}})
+    main((edged, joints), {"edged": {"count": 1}, "joints": {"names": list(CASES)[:1], "wavenumbers": (20.0,)}})

@@ -24,8 +24,7 @@ from creeping.field.waves.far_rays import isolated_rays
 from creeping.field.waves.forward import fan_half
 from creeping.geometry.surface import normal, project
 from creeping.rays.fan import RayFan
-from studies import tables
-from studies.tables import Row
+from studies import Row, main
 from tests.reference import clouds, fundamental, sphere, watson
 
 KA = (10.0, 30.0, 100.0, 300.0)
@@ -256,4 +255,4 @@ def far(cases: Sequence[Case] = tuple(PROTOTYPE)) -> Iterator[Row]:
 
 
 if __name__ == "__main__":
-    tables.main((parts, far), {"parts": {"wavenumbers": KA[:2]}, "far": {"cases": (("soft", 20.0),)}})
+    main((parts, far), {"parts": {"wavenumbers": KA[:2]}, "far": {"cases": (("soft", 20.0),)}})

@@ -27,9 +27,8 @@ from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.errors import SingularIncidenceError
 from creeping.field.body_currents import cached_currents
 from creeping.rays.fan import RayFan
-from studies import tables
+from studies import Row, main
 from studies.accuracy.bodies import bodies, kind_of, random_directions, reference_of, rms
-from studies.tables import Row
 
 WAVENUMBERS = (8.0, 14.0, 24.0)
 BOUNDARIES: tuple[Any, ...] = ("soft", "hard", 0.7, "pec")
@@ -124,4 +123,4 @@ def together(wavenumbers: tuple[float, ...] = WAVENUMBERS) -> Iterator[Row]:
 
 if __name__ == "__main__":
     quick = {"wavenumbers": WAVENUMBERS[:1]}
-    tables.main((coverage, together), {"coverage": quick, "together": quick})
+    main((coverage, together), {"coverage": quick, "together": quick})

@@ -22,9 +22,8 @@ from creeping._typing import FloatArray, IntArray
 from creeping.geodesics.bundle import project_bundle, random_bundle_points
 from creeping.geodesics.states import pack
 from creeping.geometry.surface import normal, project
-from studies import tables
+from studies import Row, main
 from studies.accuracy.bodies import rms
-from studies.tables import Row
 from tests.exact_meshes import on_body, scattered, slivers
 
 POINTS, RAYS, LENGTH = 3000, 60, 2.0
@@ -145,7 +144,7 @@ def _errors(name: str, difference: FloatArray) -> Row:
 
 
 if __name__ == "__main__":
-    tables.main(
+    main(
         (even, awkward, geodesics),
         {"even": {"counts": COUNTS[:2]}, "awkward": {"count": 2000}, "geodesics": {"counts": COUNTS[:1]}},
     )

@@ -28,9 +28,8 @@ from creeping.errors import SingularIncidenceError
 from creeping.geometry.quadrature import body_nodes
 from creeping.rays.fan import RayFan
 from creeping.shadow.attachment import occluded
-from studies import tables
+from studies import Row, main
 from studies.accuracy.bodies import bodies, kind_of, random_directions, reference_of
-from studies.tables import Row
 
 BODIES = ("sphere", "triaxial", "slender", "flat", "egg", "twisted", "peanut")
 BOUNDARIES: tuple[Any, ...] = ("soft", "hard", 0.7)
@@ -195,4 +194,4 @@ def conductor(names: Sequence[str] = BODIES, wavenumbers: Sequence[float] = (10,
 
 if __name__ == "__main__":
     quick = {"names": BODIES[:1], "wavenumbers": (10,)}
-    tables.main((scalar, conductor), {"scalar": quick, "conductor": quick})
+    main((scalar, conductor), {"scalar": quick, "conductor": quick})

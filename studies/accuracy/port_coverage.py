@@ -13,9 +13,8 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import FloatArray
-from studies import tables
+from studies import Row, main
 from studies.accuracy.bodies import random_directions
-from studies.tables import Row
 from tests.reference.clouds import ellipsoid
 from tests.reference.hard_ports import coupled, sphere_coupling
 
@@ -86,4 +85,4 @@ def ellipsoids(cases: tuple[int, ...] = (0, 1, 2, 3)) -> Iterator[Row]:
 
 
 if __name__ == "__main__":
-    tables.main((spheres, ellipsoids), {"ellipsoids": {"cases": ()}})
+    main((spheres, ellipsoids), {"ellipsoids": {"cases": ()}})

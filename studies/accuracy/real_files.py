@@ -21,8 +21,7 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any
-from studies import tables
-from studies.tables import Row
+from studies import Row, main
 
 CAD, MESHES = (".step", ".stp", ".brep", ".iges", ".igs"), (".obj", ".off", ".ply", ".stl")
 OPTIONS: dict[str, Any] = {
@@ -124,4 +123,4 @@ def files(where: Path, limit: float = 300.0) -> Iterator[Row]:
 
 
 if __name__ == "__main__":
-    tables.main((files,), {"files": {"limit": 60.0}}, places=1)
+    main((files,), {"files": {"limit": 60.0}}, places=1)

@@ -28,9 +28,8 @@ from creeping.geodesics.states import pack
 from creeping.geometry.surface import normal
 from creeping.phaseflow.building import measure
 from creeping.phaseflow.tuning.request import tuned_direct
-from studies import tables
+from studies import Row, main
 from studies.accuracy.bodies import rms
-from studies.tables import Row
 
 BODIES = ("ellipsoid", "torus", "twisted", "gridded")
 EXPENSIVE = ("gridded",)
@@ -404,4 +403,4 @@ QUICK: dict[str, Any] = {
 
 if __name__ == "__main__":
     with threads(1):
-        tables.main((long_leaps, break_even, requested, two_threads, sizes, one_leap), QUICK)
+        main((long_leaps, break_even, requested, two_threads, sizes, one_leap), QUICK)

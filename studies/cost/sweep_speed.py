@@ -30,9 +30,8 @@ from creeping.shadow.refinement import FORBIDDEN
 from creeping.shadow.status import FOLLOWED, INCIDENCE_STATUSES, NEAR_SINGULAR, OK, SINGULAR
 from creeping.sweeping.request import sweep_request
 from creeping.sweeping.sweeper import Sweeper
-from studies import tables
+from studies import Row, main
 from studies.cost.flow_speed import body, seconds_of, threads
-from studies.tables import Row
 
 LENGTH, RAYS = 4.0, 256
 REPEATS = 3
@@ -301,4 +300,4 @@ QUICK: dict[str, Any] = {
 
 if __name__ == "__main__":
     with threads(1):
-        tables.main((lines, finest, panels, fans, fields, between, frequencies), QUICK)
+        main((lines, finest, panels, fans, fields, between, frequencies), QUICK)

@@ -20,9 +20,8 @@ from creeping.field.results.comparison import Echo
 from creeping.files import read_cut
 from creeping.plotting.pages import COLOURS, EXACT, new_figure
 from creeping.sweeping.echoes import echo_of
-from studies import tables
+from studies import Row, main
 from studies.figures.drawing import plain_ticks
-from studies.tables import Row
 from tests.reference import sphere
 
 AUSTIN = "austin_IA_s7f6_bistatic.csv"
@@ -210,4 +209,4 @@ def _known(folder: Path, name: str) -> Path:
 
 
 if __name__ == "__main__":
-    tables.main((large_sphere, small_bodies), places=1)
+    main((large_sphere, small_bodies), places=1)
