@@ -185,14 +185,6 @@ def fan_of(name: str, incidence: int) -> RayFan:
     return cr.launch(flow, cr.shadow_line(body, INCIDENCES[name][incidence]), length=5.0, n_rays=384)
 
 
-def sphere_of_directions(count: int) -> FloatArray:
-    """Evenly spread unit vectors (count, 3), on a spiral."""
-    i = np.arange(count) + 0.5
-    z, phi = 1 - 2 * i / count, np.pi * (1 + np.sqrt(5)) * i
-    rim = np.sqrt(1 - z * z)
-    return np.stack([rim * np.cos(phi), rim * np.sin(phi), z], axis=-1)
-
-
 def largest(name: str, boundary: Any, k: float, incidence: int) -> float:
     """|f| straight ahead, the largest there is, L."""
     solution = reference(name, boundary, k)
@@ -205,7 +197,7 @@ def far_errors(name: str, boundary: Any, k: float, incidence: int, count: int = 
     Of the unresolved directions how many are 90 deg from d or less, and whether all err by no more than they state.
     """
     solution, fan = reference(name, boundary, k), fan_of(name, incidence)
-    r = sphere_of_directions(count)
+    r = np.asarray(cr.fibonacci_directions(count))
     found = cr.far_field(fan, r, wavenumber=k, boundary=boundary, method="rays")
     exact = solution.far_field(r)[:, incidence]
     error, theta = np.abs(found.total - exact), np.degrees(np.arccos(r @ fan.line.direction))

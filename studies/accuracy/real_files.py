@@ -8,12 +8,12 @@ lost at edges and tips, the largest field and the error of it, how many directio
 Run ``python -m studies real_files FOLDER`` (a minute a file, five at most).
 """
 
-import json
 import re
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -39,16 +39,9 @@ INCIDENT = (1.0, 0.4, 0.7)
 BESIDE = (0.9, 0.5, 0.7)
 """Another incidence, where the first one is singular."""
 SEEN = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (-0.6, 0.8, 0.0))
-CHILD = """
-import json, pathlib, resource, sys
-from studies.accuracy import real_files
-path, options, limit = sys.argv[1:]
-resource.setrlimit(resource.RLIMIT_CPU, (int(limit), int(limit) + 5))
-print(json.dumps(real_files.far_field_of(pathlib.Path(path), json.loads(options))))
-"""
-ROOT = Path(__file__).parents[2]
-HEADINGS = "file, options, stage, body s, fan s, all s, lost, method, field, error, unresolved, refusal"
-EMPTY: Row = dict.fromkeys(HEADINGS.split(", "), "")
+EMPTY: Row = dict.fromkeys(
+    "file, options, stage, body s, fan s, all s, lost, method, field, error, unresolved, refusal".split(", "), ""
+)
 
 
 def far_field_of(path: Path, options: dict[str, Any]) -> Row:
@@ -106,13 +99,14 @@ def followed(path: Path, limit: float) -> list[Row]:
 
 
 def _in_process(path: Path, options: dict[str, Any], limit: float) -> Row:
-    command = [sys.executable, "-c", CHILD, str(path), json.dumps(options), str(int(limit))]
-    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    lines = [line for line in ended.stdout.splitlines() if line.startswith("{")]
-    if lines:
-        row: Row = json.loads(lines[-1])
-        return row
-    return {**EMPTY, "file": path.name, "options": options, "stage": f"ended by {ended.returncode}"}
+    import resource
+
+    most = (resource.RLIMIT_CPU, (int(limit), int(limit) + 5))
+    with ProcessPoolExecutor(1, get_context("spawn"), resource.setrlimit, most) as pool:
+        try:
+            return pool.submit(far_field_of, path, options).result()
+        except BrokenProcessPool:
+            return {**EMPTY, "file": path.name, "options": options, "stage": "ended by the system, or out of time"}
 
 
 def files(where: Path, limit: float = 300.0) -> Iterator[Row]:

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 import creeping as cr
 import scatterers as sc
@@ -188,24 +189,13 @@ def circles(path: Path, quick: bool) -> dict[str, Any]:
 
 def first_caustic(states: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
     """First zero of M12 on each ray: points (n, 3) and times (n,), from states (n, m, 10)."""
-    m12 = states[..., 8]
-    before = np.argmax((m12[:, 1:-1] > 0) & (m12[:, 2:] <= 0), axis=1) + 1
-    rows = np.arange(len(states))
-    left, right = states[rows, before], states[rows, before + 1]
-    h = times[before + 1] - times[before]
-
-    def hermite(s: FloatArray, lane: int, rate: int) -> FloatArray:
-        a, b, m0, m1 = left[:, lane], right[:, lane], h * left[:, rate], h * right[:, rate]
-        return np.asarray(a + s * (m0 + s * (3 * (b - a) - 2 * m0 - m1 + s * (2 * (a - b) + m0 + m1))))
-
-    # the zero is simple: bisection on the cubic cannot miss it
-    low, high = np.zeros(len(rows)), np.ones(len(rows))
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        positive = hermite(middle, 8, 9) > 0
-        low, high = np.where(positive, middle, low), np.where(positive, high, middle)
-    points = np.stack([hermite(low, k, k + 3) for k in range(3)], axis=-1)
-    return points, times[before] + low * h
+    points, found = [], []
+    for one in states:
+        zeros = CubicHermiteSpline(times, one[:, 8], one[:, 9]).roots(extrapolate=False)
+        # that of the start left out
+        found.append(zeros[zeros > 0.5 * times[1]][0])
+        points.append(CubicHermiteSpline(times, one[:, :3], one[:, 3:6])(found[-1]))
+    return np.array(points), np.array(found)
 
 
 def fish_tails(

@@ -274,33 +274,30 @@ def figure_page(card: dict[str, Any], docstring: str, path: str, source: str) ->
     """
     fence = "`" * max(3, 1 + max(map(len, re.findall("`+", source)), default=0))
     quick = " --quick" if card["quick"] else ""
-    return "\n".join(
-        [
-            f"# {escaped(card['title'].rstrip('.'))}",
-            "",
-            from_docstring(docstring),
-            "",
-            f"```{{image}} ../figures/{card['file']}",
-            f":alt: {card['title']}",
-            ":width: 100%",
-            "```",
-            "",
-            f"**Measured:** {escaped(card['headline'])}.",
-            "",
-            f"Drawn by `creeping figure {card['name']}{quick} -o out`, version {card['version']}.",
-            "",
-            *numbers(card),
-            "",
-            "## Source",
-            "",
-            f"`{path}`:",
-            "",
-            f"{fence}python",
-            source.rstrip(),
-            fence,
-            "",
-        ]
-    )
+    return f"""\
+# {escaped(card["title"].rstrip("."))}
+
+{from_docstring(docstring)}
+
+```{{image}} ../figures/{card["file"]}
+:alt: {card["title"]}
+:width: 100%
+```
+
+**Measured:** {escaped(card["headline"])}.
+
+Drawn by `creeping figure {card["name"]}{quick} -o out`, version {card["version"]}.
+
+{numbers(card)}
+
+## Source
+
+`{path}`:
+
+{fence}python
+{source.rstrip()}
+{fence}
+"""
 
 
 def gallery_page(cards: list[dict[str, Any]]) -> str:
@@ -313,29 +310,27 @@ def gallery_page(cards: list[dict[str, Any]]) -> str:
         for card in cards
     ]
     cells += [""] * (-len(cells) % COLUMNS)
-    rows = [f"{'  -' if k % COLUMNS else '* -'} {cell}" for k, cell in enumerate(cells)]
-    return "\n".join(
-        [
-            "# Gallery",
-            "",
-            "Each figure is drawn by a function of `studies.figures`, which measures what it shows. Its page gives the",
-            "question, the picture, the numbers of its sidecar, and the source.",
-            "",
-            "```{list-table}",
-            ":class: thumbnails",
-            f":widths: {' '.join(['1'] * COLUMNS)}",
-            "",
-            *rows,
-            "```",
-            "",
-            "```{toctree}",
-            ":hidden:",
-            "",
-            *(f"{short(card['title'])} <{card['name']}>" for card in cards),
-            "```",
-            "",
-        ]
-    )
+    rows = "\n".join(f"{'  -' if k % COLUMNS else '* -'} {cell}" for k, cell in enumerate(cells))
+    pages = "\n".join(f"{short(card['title'])} <{card['name']}>" for card in cards)
+    return f"""\
+# Gallery
+
+Each figure is drawn by a function of `studies.figures`, which measures what it shows. Its page gives the
+question, the picture, the numbers of its sidecar, and the source.
+
+```{{list-table}}
+:class: thumbnails
+:widths: {" ".join(["1"] * COLUMNS)}
+
+{rows}
+```
+
+```{{toctree}}
+:hidden:
+
+{pages}
+```
+"""
 
 
 def short(title: str) -> str:
@@ -365,14 +360,14 @@ def escaped(text: str) -> str:
     return re.sub(r"^(\s*\d*)([-+.)])(?=\s)", r"\1\\\2", "".join(parts), flags=re.MULTILINE)
 
 
-def numbers(card: dict[str, Any]) -> list[str]:
+def numbers(card: dict[str, Any]) -> str:
     """Tables of the parameters and errors of a sidecar, and the seconds."""
     rows = ["## Numbers", ""]
     for title, value in (("Parameters", card["parameters"]), ("Errors", card["error"])):
         rows += [f"| {title} | |", "|---|---|"]
         rows += [f"| {escaped(name)} | {escaped(text)} |" for name, text in flattened(value)]
         rows.append("")
-    return [*rows, f"Drawn in {card['seconds']:g} s."]
+    return "\n".join([*rows, f"Drawn in {card['seconds']:g} s."])
 
 
 def flattened(value: Any, name: str = "") -> list[tuple[str, str]]:
