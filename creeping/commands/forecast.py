@@ -17,7 +17,6 @@ from creeping.field.frequency import suited
 from creeping.field.frequency import wavenumber as wavenumber_of
 from creeping.geodesics.equations import points_of_charts
 from creeping.geometry.checks import unit_of
-from creeping.geometry.directions import azimuth_elevation_of
 from creeping.geometry.parts import why_no_rays
 from creeping.geometry.piecewise import has_edges, is_piecewise
 
@@ -175,12 +174,6 @@ def _errors(shape: Any, k: FloatArray) -> str:
     if is_reached(shape, float(k.min())):
         return "errors of 0.1 to 5 % of the largest amplitude (0.4 dB)"
     return "errors of up to 40 % of the largest amplitude (3 dB), as parts are more curved than a wavelength allows"
-
-
-def radar_of(direction: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Azimuth and elevation (1,), degrees, of where a wave comes from that travels in a direction."""
-    azimuth, elevation = azimuth_elevation_of(-np.asarray(direction, dtype=float)[None])
-    return np.degrees(azimuth), np.degrees(elevation)
 
 
 def frequency_words(hertz: float) -> str:

@@ -169,7 +169,11 @@ def run(
     words = {name: value for name, value in locals().items() if name not in ("body", "file", "wave", "output", "json_")}
     words |= vars(wave) | file.given()
     del words["resume"]
-    _upkeep.compile_ahead()
+    # the kernels of rays are compiled while libraries are loaded
+    import creeping.kernels.block
+    from creeping.kernels import first_use
+
+    first_use.begin("creeping.shadow")
     import numpy as np
 
     import creeping as cr

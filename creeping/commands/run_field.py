@@ -1,6 +1,7 @@
 """The field of one ``creeping run``: what its options ask for, and the files that come of it. Angles in degrees."""
 
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -9,7 +10,7 @@ import numpy as np
 
 from creeping import files, plotting
 from creeping._typing import ArrayLike, FloatArray
-from creeping.commands.forecast import Forecast, asked_wavenumber, forecast, frequency_words, radar_of
+from creeping.commands.forecast import Forecast, asked_wavenumber, forecast, frequency_words
 from creeping.commands.options import Output, WaveOptions, each_once, write_tables
 from creeping.commands.resuming import Unfinished
 from creeping.errors import CreepingError, InvalidInputError
@@ -24,7 +25,7 @@ from creeping.field.results.labelled import POLARISATIONS
 from creeping.field.validity_range import validity
 from creeping.field.waves.forward import lobe_step
 from creeping.files.ffe import grid_directions
-from creeping.geometry.directions import unit_direction, unit_directions
+from creeping.geometry.directions import azimuth_elevation_of, unit_direction, unit_directions
 from creeping.geometry.incident import REMEDY, PlaneWave, incident_words
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface
@@ -96,11 +97,12 @@ class Job:
 
     def forecast(self, body: Surface, incident: Any) -> Forecast:
         """What the field is made by, and how well."""
+        azimuth, elevation = azimuth_elevation_of(-np.asarray(incident.direction, dtype=float)[None])
         return forecast(
             body,
             self.wavenumber,
             self.boundary,
-            radar=radar_of(incident.direction),
+            radar=(np.degrees(azimuth), np.degrees(elevation)),
             observers=len(self.directions),
             metres=self.unit == "m",
             cure=self.cure,
@@ -187,7 +189,6 @@ class Job:
         names = self._tables(far, direction, output)
         if output.pictures:
             names += self._pictures(far, of, output)
-        methods, counts = np.unique(far.method, return_counts=True)
         size = np.abs(far.total)
         finite = np.isfinite(size)
         largest, off = float(np.max(size[finite], initial=0.0)), far.stated_error
@@ -203,7 +204,7 @@ class Job:
             "largest": largest,
             "largest_db": top if np.isfinite(top) else None,
             "not_finite": int(np.sum(~finite)),
-            "methods": {str(name): int(count) for name, count in zip(methods, counts, strict=True)},
+            "methods": dict(sorted(Counter(far.method.tolist()).items())),
             "unresolved": int(far.unresolved.sum()),
             "error": {"rms": None, "max": None, "by": None}
             if off is None

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from creeping.field.results.far_result import FarField
 
 
-Content = tuple[dict[str, Any], dict[str, str]]
-"""Values and units by name."""
+Content = dict[str, tuple[Any, str]]
+"""Values and their units by name; of what has none the unit is empty."""
 
 
 def write_mat(
@@ -82,18 +82,18 @@ def write_mat(
     }
     kinds = [kind.__name__ for kind in type(result).__mro__ if kind.__name__ in makers]
     if kinds:
-        content, units = makers[kinds[0]](result)
+        found = makers[kinds[0]](result)
     elif isinstance(result, Sequence) and all(isinstance(one, IsoPhaseCurve) for one in result):
-        content, units = _curves(result)
+        found = _curves(result)
     else:
         raise InvalidInputError(
             f"{type(result).__name__} is not written to .mat; give one of {', '.join(makers)}, or a list of "
             "IsoPhaseCurve"
         )
-    units = {name: unit for name, unit in units.items() if name in content}
     if observed is not None:
-        content |= {"observe": np.array(observed[0], dtype=object), "angle": observed[1]}
-        units |= {"angle": "degree"}
+        found |= {"observe": (np.array(observed[0], dtype=object), ""), "angle": (observed[1], "degree")}
+    content = {name: value for name, (value, _) in found.items()}
+    units = {name: unit for name, (_, unit) in found.items() if unit}
     about = "time factor exp(-i w t); far field f exp(i k r)/r; 4 pi |f|^2 is the cross section"
     content |= {"units": units, "about": about, "creeping_version": __version__}
     # a full disk is an error of Python's own writing
@@ -103,125 +103,105 @@ def write_mat(
         aside.write_bytes(whole.getvalue())
 
 
+def _attributes(result: Any, **units: str) -> Content:
+    """Attributes of a result with their units."""
+    return {name: (getattr(result, name), unit) for name, unit in units.items()}
+
+
+def _words(texts: Any) -> tuple[Any, str]:
+    """Texts, as MATLAB has them in a cell array."""
+    return np.array(texts, dtype=object), ""
+
+
 def _line(line: ShadowLine) -> Content:
-    length = unit_of(line.body)
-    content = {
+    unit, curves = unit_of(line.body), line.curves
+    numbers, vectors = (
+        {"arclength": unit, "curvature": power(unit, -1)},
+        {"points": unit, "normals": "1", "tangents": "1"},
+    )
+    return {
         **_wave(line),
-        "curve": number_of(line.curves),
-        **{n: joined([getattr(c, n) for c in line.curves]) for n in ("arclength", "curvature")},
-        **{n: joined([getattr(c, n) for c in line.curves], 3) for n in ("points", "normals", "tangents")},
-        "status": np.array([str(s) for c in line.curves for s in c.status], dtype=object),
-        "length": line.length,
+        "curve": (number_of(curves), ""),
+        **{name: (joined([getattr(c, name) for c in curves]), of) for name, of in numbers.items()},
+        **{name: (joined([getattr(c, name) for c in curves], 3), of) for name, of in vectors.items()},
+        "status": _words([str(s) for c in curves for s in c.status]),
+        "length": (line.length, unit),
     }
-    units = {"arclength": length, "points": length, "length": length, "curvature": power(length, -1)}
-    units |= dict.fromkeys(("direction", "normals", "tangents"), "1")
-    return content, units | {"source": length}
 
 
-def _wave(line: ShadowLine) -> dict[str, Any]:
+def _wave(line: ShadowLine) -> Content:
     """Direction of a plane wave, or where a point source is."""
     if isinstance(line.source, PointSource):
-        return {"source": np.array(line.source.position)}
-    return {"direction": line.direction}
+        return {"source": (np.array(line.source.position), unit_of(line.body))}
+    return {"direction": (line.direction, "1")}
 
 
 def _fan(fan: RayFan) -> Content:
     length = unit_of(fan.body)
-    names = (
-        *("points", "directions", "travel_time", "eikonal", "spreading", "spreading_rate", "curvature", "attenuation"),
-        *("caustic_index", "status", "detachment", "curve_index", "arclength"),
-    )
-    content = {name: np.asarray(getattr(fan, name)) for name in names} | _wave(fan.line)
-    time = length if speed_of(fan.body) is None else "time"
-    units = dict.fromkeys(("points", "arclength"), length)
-    units |= dict.fromkeys(("travel_time", "eikonal", "detachment"), time)
-    units |= dict.fromkeys(("spreading_rate", "curvature"), power(length, -1)) | {"attenuation": f"{length}^(1/3)"}
-    units |= dict.fromkeys(("direction", "directions", "spreading"), "1")
-    return content, units | {"source": length}
+    time, curved = length if speed_of(fan.body) is None else "time", power(length, -1)
+    of_points = _attributes(fan, points=length, directions="1", travel_time=time, eikonal=time, spreading="1")
+    of_points |= _attributes(fan, spreading_rate=curved, curvature=curved, attenuation=f"{length}^(1/3)")
+    of_rays = _attributes(fan, caustic_index="", status="", detachment=time, curve_index="", arclength=length)
+    return {name: (np.asarray(value), unit) for name, (value, unit) in (of_points | of_rays).items()} | _wave(fan.line)
 
 
 def _curves(curves: Sequence[IsoPhaseCurve]) -> Content:
-    content = {
-        "curve": number_of(curves),
-        "points": joined([c.points for c in curves], 3),
-        "rays": joined([c.rays for c in curves]).astype(float),
-        "of": np.array([c.of for c in curves], dtype=object),
-        "level": np.array([c.level for c in curves]),
-        "closed": np.array([c.closed for c in curves], dtype=bool),
-    }
     # curves do not know their body
-    return content, {"points": UNKNOWN, "level": UNKNOWN}
+    return {
+        "curve": (number_of(curves), ""),
+        "points": (joined([c.points for c in curves], 3), UNKNOWN),
+        "rays": (joined([c.rays for c in curves]).astype(float), ""),
+        "of": _words([c.of for c in curves]),
+        "level": (np.array([c.level for c in curves]), UNKNOWN),
+        "closed": (np.array([c.closed for c in curves], dtype=bool), ""),
+    }
 
 
 def _cut(cut: FieldCut) -> Content:
     field: Any = cut.field
     length = field.length_unit
-    content: dict[str, Any] = {
-        "across": cut.across,
-        "up": cut.up,
-        "point": cut.point,
-        "axes": cut.axes,
-        "points": cut.points,
-        "outside": cut.outside,
-        **{name: cut.on_grid(field.values if name == "u" else getattr(field, name)) for name in cut.quantities},
-        "error": cut.error,
-        "status": cut.status,
-        "method": cut.on_grid(field.method.astype(object), "inside"),
-        "wavenumber": field.wavenumber,
-        "boundary": field.boundary,
-        "order": field.order,
+    values = {name: field.values if name == "u" else getattr(field, name) for name in cut.quantities}
+    return {
+        **_attributes(cut, across=length, up=length, point=length, axes="1", points=length, outside=""),
+        **{name: (cut.on_grid(one), field.unit) for name, one in values.items()},
+        **_attributes(cut, error=field.unit, status=""),
+        "method": (cut.on_grid(field.method.astype(object), "inside"), ""),
+        **_attributes(field, wavenumber=power(length, -1), boundary="", order=""),
     }
-    units = dict.fromkeys(("across", "up", "point", "points"), length) | {"axes": "1"}
-    return content, units | dict.fromkeys((*cut.quantities, "error"), field.unit) | {"wavenumber": power(length, -1)}
 
 
 def _far(far: FarField) -> Content:
     angles, length = np.degrees(angles_of(far.directions)), far.unit
-    content: dict[str, Any] = {
-        "directions": far.directions,
-        "theta": angles[:, 0],
-        "phi": angles[:, 1],
-        "f": far.total,
-        **far.parts,
-        "error": far.error,
-        "cross_section": far.cross_section,
-        "cross_section_dB": far.dbsm,
-        "unresolved": far.unresolved,
-        "method": far.method.astype(object),
-        "wavenumber": far.wavenumber,
-        "boundary": far.boundary,
-        "order": far.order,
+    return {
+        "directions": (far.directions, "1"),
+        "theta": (angles[:, 0], "degree"),
+        "phi": (angles[:, 1], "degree"),
+        **{name: (values, length) for name, values in {"f": far.total, **far.parts, "error": far.error}.items()},
+        "cross_section": (far.cross_section, power(length, 2)),
+        "cross_section_dB": (far.dbsm, "dBsm" if length == "m" else f"dB re 1 {length}^2"),
+        "unresolved": (far.unresolved, ""),
+        "method": (far.method.astype(object), ""),
+        **_attributes(far, wavenumber=power(length, -1), boundary="", order=""),
     }
-    units = {"directions": "1", "theta": "degree", "phi": "degree", "wavenumber": power(length, -1)}
-    units |= dict.fromkeys(("f", *far.parts, "error"), length)
-    area = "dBsm" if length == "m" else f"dB re 1 {length}^2"
-    return content, units | {"cross_section": power(length, 2), "cross_section_dB": area}
 
 
 def _echo(echo: Echo) -> Content:
-    low, high = echo.bounds()
-    content: dict[str, Any] = {
-        "quantity": echo.level_name[0],
-        "channels": np.array(echo.channels, dtype=object),
-        "azimuth": echo.azimuth,
-        "elevation": echo.elevation,
-        "frequency": echo.hertz,
-        "wavenumber": echo.wavenumbers,
-        "f": echo.total,
-        **echo.parts,
-        "error": echo.error,
-        "level": echo.levels(),
-        "level_low": low,
-        "level_high": high,
-        "unresolved": echo.unresolved,
-        "by_currents": echo.by_currents,
-        "otherwise_by": echo.otherwise,
+    (low, high), (name, unit) = echo.bounds(), echo.level_name
+    found: Content = {
+        "quantity": (name, ""),
+        "channels": _words(echo.channels),
+        **_attributes(echo, azimuth="degree", elevation="degree"),
+        "frequency": (echo.hertz, "Hz"),
+        "wavenumber": (echo.wavenumbers, "1/m"),
+        **{part: (values, "m") for part, values in {"f": echo.total, **echo.parts, "error": echo.error}.items()},
+        "level": (echo.levels(), unit),
+        "level_low": (low, unit),
+        "level_high": (high, unit),
+        **_attributes(echo, unresolved="", by_currents=""),
+        "otherwise_by": (echo.otherwise, ""),
     }
     if echo.incidence is not None:
-        content["incidence"] = np.array(echo.incidence)
+        found["incidence"] = (np.array(echo.incidence), "degree")
     if echo.sound_speed is not None:
-        content["sound_speed"] = echo.sound_speed
-    units = {"azimuth": "degree", "elevation": "degree", "incidence": "degree", "frequency": "Hz"}
-    units |= {"wavenumber": "1/m", "sound_speed": "m/s"} | dict.fromkeys(("f", *echo.parts, "error"), "m")
-    units |= dict.fromkeys(("level", "level_low", "level_high"), echo.level_name[1])
-    return content, units
+        found["sound_speed"] = (echo.sound_speed, "m/s")
+    return found

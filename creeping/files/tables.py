@@ -5,7 +5,7 @@ or value; its columns are explained in lines that begin with ``#``.
 """
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -116,22 +116,20 @@ def write_csv(
     CreepingError
         If the file cannot be written.
     """
-    parts = {"line": line, "fan": fan, "curves": curves, "far": far, "cut": cut}
-    given = [name for name, value in parts.items() if value is not None]
+    makers: dict[str, tuple[Any, Callable[[Any], list[Column]]]] = {
+        "line": (line, _line_columns),
+        "fan": (fan, _fan_columns),
+        "curves": (curves, _curve_columns),
+        "far": (far, lambda one: _far_columns(one, observed)),
+        "cut": (cut, _cut_columns),
+    }
+    given = {name: maker(what) for name, (what, maker) in makers.items() if what is not None}
     if len(given) != 1:
         raise InvalidInputError(
-            f"write_csv got {' and '.join(given) or 'nothing'}; give exactly one of {', '.join(parts)}, a file for each"
+            f"write_csv got {' and '.join(given) or 'nothing'}; give exactly one of {', '.join(makers)}, "
+            "a file for each"
         )
-    if line is not None:
-        columns = _line_columns(line)
-    elif fan is not None:
-        columns = _fan_columns(fan)
-    elif curves is not None:
-        columns = _curve_columns(curves)
-    elif far is not None:
-        columns = _far_columns(far, observed)
-    else:
-        columns = _cut_columns(cut)
+    (columns,) = given.values()
     _write_table(path, columns, mark)
 
 

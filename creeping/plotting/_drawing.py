@@ -302,12 +302,6 @@ def rays_caption(
     return caption(line.body, line.source, error, faded, name=name)
 
 
-def bare(body: Any, direction: FloatArray, *, view: View | None = None, cells: int = 80) -> Drawing:
-    """Compose the picture of a body and a wave alone."""
-    mesh, normals = drawn_mesh(body, cells)
-    return Drawing(body, direction, view or shadow_view(direction), mesh, normals, [], LevelColours.of(()))
-
-
 def compose(
     line: ShadowLine,
     fan: RayFan | None = None,

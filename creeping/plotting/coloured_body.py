@@ -29,10 +29,11 @@ from creeping.field.waves.surface import scalar_boundary
 from creeping.geometry.checks import unit_of
 from creeping.geometry.incident import PlaneWave
 from creeping.geometry.parts import why_no_rays
+from creeping.geometry.piecewise import drawn_mesh
 from creeping.geometry.surface import Surface, normal, project
 from creeping.geometry.triangulation import Triangulation
-from creeping.plotting._drawing import Drawing, View, bare, caption, compose
-from creeping.plotting._strokes import Stroke, chosen_rays
+from creeping.plotting._drawing import Drawing, View, caption, compose, shadow_view
+from creeping.plotting._strokes import LevelColours, Stroke, chosen_rays
 from creeping.plotting.pages import PAGE, add_bar, beyond, curve_style, dressed, save_figure, written_figure
 from creeping.plotting.pictures import chosen_backend, drawn_page
 from creeping.rays.fan import RayFan
@@ -194,8 +195,9 @@ def decay_picture(
             _draw_decay(ax, fan, ray, level, curve_style(number, 1.2))
         ax.set_xlim(0.0, float(fan.travel_time[-1]))
         ax.set_ylim(low, high)
+        dressed(ax, f"arclength from the shadow line ({unit_of(fan.body)})", _name(kind))
         title = f"Field of single rays, k = {k:g}/{unit_of(fan.body)}, {_boundary_name(kind)} boundary"
-        dressed(ax, f"arclength from the shadow line ({unit_of(fan.body)})", _name(kind), title)
+        ax.set_title(title, fontsize=9, parse_math=False)
         handles = ax.get_legend_handles_labels()[0]
         if np.any(fan.caustic_index[picked]):
             handles.append(Line2D([], [], color=NOTHING, label="caustic", **CAUSTIC))
@@ -260,15 +262,19 @@ def currents_picture(
     backend = chosen_backend(backend)
     k = currents.wavenumber
     body: Any = currents.body
-    asked: Any = {"view": view, "cells": cells or cells_of(body, k)}
+    cells = cells or cells_of(body, k)
     direction = currents.direction
     line = None
     if not why_no_rays(body):
         # none is drawn that crosses itself
         with suppress(SingularIncidenceError):
             line = shadow_line(body, direction)
-    drawing = compose(line, **asked) if line else bare(body, direction, **asked)
-    drawing = replace(drawing, title=caption(body, PlaneWave(direction), name=name))
+    title = caption(body, PlaneWave(direction), name=name)
+    if line:
+        drawing = replace(compose(line, view=view, cells=cells), title=title)
+    else:
+        camera = view or shadow_view(direction)
+        drawing = Drawing(body, direction, camera, *drawn_mesh(body, cells), [], LevelColours.of(()), title=title)
     levels = current_levels(currents, drawing.mesh.vertices, incident)
     what = {"soft": "|∂u/∂n|/k", "conductor": "|n × H|"}.get(currents.boundary.kind, "|u|")
     wave = wave or f"k = {k:g}/{unit_of(currents.body)}"

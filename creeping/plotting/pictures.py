@@ -19,13 +19,12 @@ from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.plotting._drawing import Drawing, View, compose
 from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, RayOptions, Stroke, runs
-from creeping.plotting.pages import InlineAxes3D, add_bar, new_figure, save_figure
+from creeping.plotting.pages import PAGE, InlineAxes3D, add_bar, new_figure, save_figure
 from creeping.plotting.scene import gl_available, render
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowLine
 
-WIDTH = 6.4  # inches
 TITLE_SIZE = 8.0
 """Of the letters of a title, points."""
 FINER = 1.6
@@ -133,13 +132,13 @@ def drawn_page(drawing: Drawing, backend: str, dpi: int) -> tuple[Any, Place]:
 def _page(drawing: Drawing) -> tuple[Any, Place]:
     """Figure with room for the body's picture, the legend below and the colour bar at the right."""
     low, high = drawing.frame
-    width = 0.82 * WIDTH
+    width = 0.82 * PAGE[0]
     # neither a strip nor a tower: the rest of the room stays white
     body = float(np.clip(width * (high[1] - low[1]) / (high[0] - low[0]), 2.4, 4.6))
     legend = 0.55 if len({stroke.label for stroke in drawing.strokes} - {""}) > 3 else 0.38
     lines = drawing.title.count("\n") + 1 if drawing.title else 0
     height = body + legend + 0.05 + 0.16 * lines
-    return new_figure((WIDTH, height)), (0.01, legend / height, width / WIDTH, body / height)
+    return new_figure((PAGE[0], height)), (0.01, legend / height, width / PAGE[0], body / height)
 
 
 def _draw_pyvista(figure: Any, place: Place, drawing: Drawing, dpi: int) -> None:

@@ -21,11 +21,8 @@ from creeping.geometry.parts import inside, why_no_rays
 from creeping.plotting import pages
 from creeping.plotting.coloured_body import LEAST_SAMPLES, NOTHING, at_phase
 
-PAGE = 6.4  # inches
 FRONT = "#ffffff"
 """Colour of wave fronts."""
-SECTION = "#5a6872"
-"""Colour of the body's section."""
 HATCH, HATCHED = "///", "#6d767d"
 DOUBTFUL = "#a3476a", "#ffffff"
 """Colours in the legend of what is hatched upon the colours of the field."""
@@ -239,7 +236,8 @@ def _title(cut: FieldCut) -> str:
 
 def _page(cut: FieldCut) -> tuple[float, float]:
     share = float(np.ptp(cut.up) / np.ptp(cut.across))
-    return PAGE, float(np.clip(0.74 * PAGE * share + 1.0, 2.4, 9.0))
+    width = pages.PAGE[0]
+    return width, float(np.clip(0.74 * width * share + 1.0, 2.4, 9.0))
 
 
 def missing_of(cut: FieldCut) -> BoolArray:
@@ -282,7 +280,7 @@ def dress(cut: FieldCut, ax: Any) -> None:
     points = grid_points(cut.point, cut.axes, across, up)
     level = _level(cut.body, points.reshape(-1, 3)).reshape(points.shape[:2])
     if level.min() < 0 < level.max():
-        ax.contourf(across, up, level, [level.min() - 1.0, 0.0], colors=SECTION, zorder=2)
+        ax.contourf(across, up, level, [level.min() - 1.0, 0.0], colors=pages.GREY, zorder=2)
         ax.contour(across, up, level, [0.0], colors="#111111", linewidths=0.8, zorder=2.1)
     ax.plot(*cut.shadow_points().T, "o", color="#111111", markeredgecolor="#ffffff", markersize=5, zorder=3)
     along = cut.axes @ cut.direction
@@ -342,7 +340,7 @@ def add_cut_legend(cut: FieldCut, ax: Any, *, fresh: bool, fronts: bool = False)
 
     handles: list[Any] = []
     if np.any(~cut.outside):
-        handles.append(Patch(facecolor=SECTION, edgecolor="#111111", label="body"))
+        handles.append(Patch(facecolor=pages.GREY, edgecolor="#111111", label="body"))
     if len(cut.shadow_points()):
         look: dict[str, Any] = {"color": "#111111", "markeredgecolor": "#ffffff", "markersize": 5}
         handles.append(Line2D([], [], marker="o", linestyle="none", label="shadow line", **look))
