@@ -6,7 +6,8 @@ and of rays at their ends against direct integration.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -17,13 +18,33 @@ from creeping.geometry.evaluators import polar_frame
 from creeping.geometry.piecewise import drawn_mesh
 from creeping.geometry.surface import Surface, size
 from creeping.plotting import pictures, plot_line
-from creeping.plotting._drawing import Drawing, View, compose
+from creeping.plotting._drawing import Drawing, Mark, View, compose
 from creeping.plotting._strokes import RAY_COLOUR, LevelColours, Stroke, closed, refined
 from creeping.plotting.pages import add_bar
 
 SOURCE_COLOUR = "#c2185b"
 RAY_COUNT, CHECKED_RAYS = 32, 64
 """Rays of a fan that are drawn, and of a bundle that are traced again."""
+
+
+@dataclass(frozen=True)
+class Scene(Drawing):
+    """A body with curves and the triad of its axes; no wave, so no arrow of incidence."""
+
+    @cached_property
+    def frame(self) -> tuple[FloatArray, FloatArray]:
+        """Lower left and upper right corner (2,) of the picture, L."""
+        tips = [mark.foot + 1.4 * (mark.tip - mark.foot) for mark in self.triad]
+        return self.view.frame(np.concatenate([self.mesh.vertices, np.stack(tips)]), margin=0.02)
+
+    @cached_property
+    def triad(self) -> list[Mark]:
+        """Coordinate axes in the lower left corner of the body's box, where a round body leaves room."""
+        low, high = self.view.frame(self.mesh.vertices, margin=0.0)
+        length = 0.1 * float(np.max(high - low))
+        flat = self.view.project(length * np.eye(3))
+        foot = self._at(*(low - np.minimum(flat.min(axis=0), 0.0) - 0.05 * (high - low)))
+        return [Mark(name, foot, foot + length * unit) for name, unit in zip("xyz", np.eye(3), strict=True)]
 
 
 def draw_curves(
@@ -40,7 +61,7 @@ def draw_curves(
     source : (3,), L, optional
         A point to mark, where it is visible.
     """
-    drawing = Drawing(body, None, view, *drawn_mesh(body, 80), list(strokes), LevelColours.of([]))
+    drawing = Scene(body, None, view, *drawn_mesh(body, 80), list(strokes), LevelColours.of([]))
     pictures.draw(ax, drawing)
     if source is not None and view.visible(body, np.asarray(source, dtype=float)[None])[0]:
         ax.plot(*np.reshape(source, (3, 1)), "o", ms=4, color=SOURCE_COLOUR, mec="white", mew=0.6, zorder=25)
