@@ -1,4 +1,4 @@
-"""Files of lines, fans, iso-phase curves, far fields, fields on planes and echoes: VTK (.vtp) and CSV.
+"""Files of lines, fans, iso-phase curves, far fields, fields on planes and echoes, as CSV.
 
 Numbers keep all 17 digits, so that what is read back is what was written. A table has one row for each point, direction
 or value; its columns are explained in lines that begin with ``#``.
@@ -14,7 +14,6 @@ from creeping._typing import Any, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.results.comparison import LEVELS, cross_section_decibels, decibels
 from creeping.field.results.point_result import FieldStatus
-from creeping.files.polylines import polydata
 from creeping.geometry.checks import UNKNOWN, unit_of
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
@@ -32,45 +31,6 @@ if TYPE_CHECKING:
 
 Column = tuple[str, str, Any]
 """Name, what it holds (nothing if the name says it), and values (rows,)."""
-
-
-def write_vtp(
-    path: str | os.PathLike[str],
-    line: ShadowLine | None = None,
-    fan: RayFan | None = None,
-    curves: Sequence[IsoPhaseCurve] = (),
-) -> None:
-    """Write polylines as VTK XML PolyData, for ParaView, pyvista and others.
-
-    One polyline per curve of the shadow line, ray and iso-phase curve. Point arrays: travel_time, eikonal, spreading,
-    spreading_rate, curvature, attenuation, caustic_index, line_status (0 attached, 1 occluded, 2 concave), ray_status
-    (the ray's, from where it applies). Cell arrays: kind (0 shadow line, 1 ray, 2 iso-phase curve), ray (its number),
-    status (`RayStatus`), curve_index, level. Where an array does not apply it is NaN, or -1 if of integers.
-
-    Parameters
-    ----------
-    path : str or path
-        File to write; replaced at once when complete.
-    line, fan, curves
-        What to write; leave out what is not wanted.
-
-    Raises
-    ------
-    CreepingError
-        If the file cannot be written.
-    """
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
-
-    # to memory, then by Python: a full disk is an error here, whereas VTK's own writing to a file only logs it
-    writer = vtkXMLPolyDataWriter()
-    writer.SetInputData(polydata(line, fan, curves))
-    writer.SetHeaderTypeToUInt64()
-    # binary, because VTK's reader stops at an ascii nan
-    writer.SetDataModeToBinary()
-    writer.WriteToOutputStringOn()
-    writer.Write()
-    with written_aside(path) as aside:
-        aside.write_text(writer.GetOutputString(), encoding="ascii")
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:

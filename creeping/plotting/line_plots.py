@@ -32,7 +32,7 @@ def line_of(curve: ShadowCurve) -> ShadowLine:
 
 
 def plot_line(
-    line: ShadowLine,
+    line: ShadowLine | ShadowCurve | RayFan,
     ax: Any = None,
     *,
     kind: str | None = None,
@@ -46,7 +46,8 @@ def plot_line(
 
     Parameters
     ----------
-    line : ShadowLine
+    line : ShadowLine, ShadowCurve or RayFan
+        A fan is drawn with its line.
     ax : matplotlib.axes.Axes, optional
         By default those of a new figure.
     kind : {"parameters", "3d"}
@@ -76,6 +77,11 @@ def plot_line(
     InvalidInputError
         If the kind is unknown or not that of the axes, or a view is given for the plane.
     """
+    if isinstance(line, RayFan):
+        fan = line
+        line = fan.line
+    elif isinstance(line, ShadowCurve):
+        line = line_of(line)
     if _in_space(ax, kind):
         drawing = compose(line, fan, curves, view=view, **shown)
         if ax is None:

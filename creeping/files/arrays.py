@@ -1,5 +1,9 @@
-"""Results as MATLAB files (.mat, version 5): arrays by name, their units in the struct ``units``."""
+"""Results as arrays by name: for MATLAB (.mat, version 5) with their units, and for pyvista and VTK (.vtp).
 
+Shadow lines, fans and iso-phase curves are polylines with named arrays, for files and for pyvista alike.
+"""
+
+# help() shows names of types instead of what they stand for
 from __future__ import annotations
 
 import io
@@ -8,6 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from creeping._typing import Any, FloatArray
 from creeping._version import __version__
@@ -19,14 +24,15 @@ from creeping.geometry.evaluators import speed_of
 from creeping.geometry.incident import PointSource
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
+from creeping.rays.status import ENDED, RayStatus
 from creeping.shadow.line import ShadowLine
+from creeping.shadow.status import STATUSES
 from creeping.storage.atomic import written_aside
 
 if TYPE_CHECKING:
     from creeping.field.cut_result import FieldCut
     from creeping.field.results.comparison import Echo
     from creeping.field.results.far_result import FarField
-
 
 Content = dict[str, tuple[Any, str]]
 """Values and their units by name; of what has none the unit is empty."""
@@ -205,3 +211,117 @@ def _echo(echo: Echo) -> Content:
     if echo.sound_speed is not None:
         found["sound_speed"] = (echo.sound_speed, "m/s")
     return found
+
+
+RAY_ARRAYS = ("eikonal", "spreading", "spreading_rate", "curvature", "attenuation")
+POINT_ARRAYS: dict[str, type] = dict.fromkeys(("travel_time", *RAY_ARRAYS), np.float64)
+POINT_ARRAYS |= dict.fromkeys(("caustic_index", "line_status", "ray_status"), np.int64)
+"""Arrays with a value per point, and their types,"""
+CELL_ARRAYS: dict[str, type] = dict.fromkeys(("kind", "ray", "status", "curve_index"), np.int64) | {"level": np.float64}
+"""and per polyline. Where one does not apply it is NaN, or -1 if of integers."""
+
+Lines = tuple[FloatArray, bool, dict[str, Any]]
+"""Points (lines, k, 3), whether they are closed, and arrays (lines, k), (k,) and (lines,) by name."""
+
+
+def polydata(line: ShadowLine | None = None, fan: RayFan | None = None, curves: Sequence[IsoPhaseCurve] = ()) -> Any:
+    """Polylines as a ``pyvista.PolyData``, with the points and arrays that `write_vtp` writes.
+
+    Building one loads no part of VTK that draws, so it needs neither a display nor OpenGL.
+
+    Parameters
+    ----------
+    line, fan, curves
+        What to collect; leave out what is not wanted.
+
+    Returns
+    -------
+    pyvista.PolyData
+        Copies: what is done to it leaves the results alone.
+    """
+    import pyvista
+
+    found: list[Lines] = []
+    for number, one in enumerate(line.curves if line is not None else ()):
+        status = np.array([STATUSES.index(str(name)) for name in one.status], dtype=np.int64)
+        found.append((one.points[None], True, {"kind": [0], "line_status": status, "curve_index": [number]}))
+    if fan is not None:
+        found.append((fan.points, False, _ray_arrays(fan)))
+    for curve in curves:
+        values = {"kind": [2], curve.of: np.full(len(curve.points), float(curve.level)), "level": [curve.level]}
+        found.append((curve.points[None], bool(curve.closed), values))
+    points, cells, first = [np.zeros((0, 3))], [np.zeros(0, dtype=np.int64)], 0
+    for where, closed, _ in found:
+        lines, length = np.shape(where)[:2]
+        points.append(np.asarray(where, dtype=float).reshape(-1, 3))
+        numbers = first + np.arange(lines * length, dtype=np.int64).reshape(lines, length)
+        first += lines * length
+        # the number of its points, then these; one that is closed ends with its first
+        ends = np.concatenate([numbers, numbers[:, :1]], axis=1) if closed else numbers
+        cells.append(np.insert(ends, 0, ends.shape[1], axis=1).ravel())
+    mesh = pyvista.PolyData(np.concatenate(points), lines=np.concatenate(cells))
+    for name, dtype in POINT_ARRAYS.items():
+        columns = [_column(arrays.get(name), dtype, np.size(where) // 3) for where, _, arrays in found]
+        mesh.point_data[name] = np.concatenate([np.zeros(0, dtype=dtype), *columns])
+    for name, dtype in CELL_ARRAYS.items():
+        columns = [_column(arrays.get(name), dtype, len(where)) for where, _, arrays in found]
+        mesh.cell_data[name] = np.concatenate([np.zeros(0, dtype=dtype), *columns])
+    return mesh
+
+
+def write_vtp(
+    path: str | os.PathLike[str],
+    line: ShadowLine | None = None,
+    fan: RayFan | None = None,
+    curves: Sequence[IsoPhaseCurve] = (),
+) -> None:
+    """Write polylines as VTK XML PolyData, for ParaView, pyvista and others.
+
+    One polyline per curve of the shadow line, ray and iso-phase curve. Point arrays: travel_time, eikonal, spreading,
+    spreading_rate, curvature, attenuation, caustic_index, line_status (0 attached, 1 occluded, 2 concave), ray_status
+    (the ray's, from where it applies). Cell arrays: kind (0 shadow line, 1 ray, 2 iso-phase curve), ray (its number),
+    status (`RayStatus`), curve_index, level. Where an array does not apply it is NaN, or -1 if of integers.
+
+    Parameters
+    ----------
+    path : str or path
+        File to write; replaced at once when complete.
+    line, fan, curves
+        What to write; leave out what is not wanted.
+
+    Raises
+    ------
+    CreepingError
+        If the file cannot be written.
+    """
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+
+    # to memory, then by Python: a full disk is an error here, whereas VTK's own writing to a file only logs it
+    writer = vtkXMLPolyDataWriter()
+    writer.SetInputData(polydata(line, fan, curves))
+    writer.SetHeaderTypeToUInt64()
+    # binary, because VTK's reader stops at an ascii nan
+    writer.SetDataModeToBinary()
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    with written_aside(path) as aside:
+        aside.write_text(writer.GetOutputString(), encoding="ascii")
+
+
+def _ray_arrays(fan: RayFan) -> dict[str, Any]:
+    """Arrays of a fan at its points (rays, steps) and by ray (rays,)."""
+    times = np.broadcast_to(fan.travel_time, np.shape(fan.eikonal))
+    arrays = {name: getattr(fan, name) for name in (*RAY_ARRAYS, "caustic_index")} | {"travel_time": times}
+    status, detachment = np.asarray(fan.status)[:, None], np.asarray(fan.detachment)[:, None]
+    # these come on the way, other trouble is there from the start
+    met = np.isin(status, ENDED)
+    arrays["ray_status"] = np.where(met & (times <= detachment), RayStatus.OK, status)
+    rays = len(status)
+    return arrays | {"kind": [1] * rays, "ray": range(rays), "status": fan.status, "curve_index": fan.curve_index}
+
+
+def _column(values: Any, dtype: type, count: int) -> NDArray[Any]:
+    """Values as one column, or what stands for none."""
+    if values is None:
+        return np.full(count, np.nan if dtype is np.float64 else -1, dtype=dtype)
+    return np.asarray(values, dtype=dtype).reshape(-1)
