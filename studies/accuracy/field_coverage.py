@@ -33,7 +33,6 @@ from studies.accuracy.bodies import bodies, kind_of, random_directions, referenc
 WAVENUMBERS = (8.0, 14.0, 24.0)
 BOUNDARIES: tuple[Any, ...] = ("soft", "hard", 0.7, "pec")
 INCIDENCES = 3
-OFF, ALARM = 0.03, 0.01
 
 
 @cache
@@ -74,14 +73,14 @@ def _columns(
     off, largest = np.abs(far.total - exact), np.abs(exact).max()
     flagged = far.unresolved.reshape(-1, *[1] * (off.ndim - 1))
     covered = off <= far.error + residual * rms(exact)
-    bad = off > OFF * largest
+    bad = off > 0.03 * largest
     shares = {
         "cover": covered[:500],
         "ahead": covered[500:],
         "off": bad,
-        "rays off": np.abs(rays - exact) > OFF * largest,
+        "rays off": np.abs(rays - exact) > 0.03 * largest,
         "silent": bad & ~covered & ~flagged,
-        "false": flagged & (off < ALARM * largest),
+        "false": flagged & (off < 0.01 * largest),
     }
     return {
         "ext": 100 * cached_currents(fan, k, kind).extinction,

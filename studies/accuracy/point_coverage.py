@@ -32,8 +32,6 @@ from studies import Row, main
 from studies.accuracy.bodies import bodies, kind_of, random_directions, reference_of
 
 BODIES = ("sphere", "triaxial", "slender", "flat", "egg", "twisted", "peanut")
-BOUNDARIES: tuple[Any, ...] = ("soft", "hard", 0.7)
-HEIGHTS = (0.03, 3.0)
 Part = tuple[FloatArray, Any, BoolArray, float]
 """True errors, what states them, which of them belong to the part, and the unit of the error."""
 
@@ -56,7 +54,7 @@ def places(name: str, d: FloatArray, rng: np.random.Generator) -> tuple[FloatArr
     nodes = body_nodes(body, 20.0)
     pick = rng.choice(len(nodes.points), 700, p=nodes.weights / nodes.weights.sum())
     on, normals = nodes.points[pick], nodes.normals[pick]
-    height = np.exp(rng.uniform(np.log(HEIGHTS[0]), np.log(HEIGHTS[1]), 600))
+    height = np.exp(rng.uniform(np.log(0.03), np.log(3.0), 600))
     off = on[:600] + height[:, None] * normals[:600]
     axis = rng.uniform(1.1, 4.0, 100)[:, None] * d + 0.1 * rng.normal(size=(100, 3))
     points = np.concatenate([off, axis])
@@ -181,7 +179,9 @@ def _cells(found: Row) -> Row:
 
 
 def scalar(
-    names: Sequence[str] = BODIES, boundaries: Sequence[Any] = BOUNDARIES, wavenumbers: Sequence[float] = (10, 20, 30)
+    names: Sequence[str] = BODIES,
+    boundaries: Sequence[Any] = ("soft", "hard", 0.7),
+    wavenumbers: Sequence[float] = (10, 20, 30),
 ) -> Iterator[Row]:
     """Soft, hard and eta = 0.7: share covered (stated over true error, true error)."""
     return _table([name for name in names if name != "egg"], boundaries, wavenumbers)

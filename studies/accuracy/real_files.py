@@ -21,9 +21,9 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any
+from creeping.commands.options import CAD, MESHES
 from studies import Row, main
 
-CAD, MESHES = (".step", ".stp", ".brep", ".iges", ".igs"), (".obj", ".off", ".ply", ".stl")
 OPTIONS: dict[str, Any] = {
     "part": "largest",
     "cap": 1e9,
@@ -33,12 +33,6 @@ OPTIONS: dict[str, Any] = {
     "units": "m",
 }
 """What is taken of an option that a refusal names, in this order."""
-ACROSS = 10.0
-"""Wavelengths across a body."""
-INCIDENT = (1.0, 0.4, 0.7)
-BESIDE = (0.9, 0.5, 0.7)
-"""Another incidence, where the first one is singular."""
-SEEN = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (-0.6, 0.8, 0.0))
 EMPTY: Row = dict.fromkeys(
     "file, options, stage, body s, fan s, all s, lost, method, field, error, unresolved, refusal".split(", "), ""
 )
@@ -51,12 +45,13 @@ def far_field_of(path: Path, options: dict[str, Any]) -> Row:
     try:
         body: Any = (sc.Cad if path.suffix.lower() in CAD else sc.Mesh)(path, cache=False, **options)
         row |= {"body s": time.process_time() - began, "stage": "fan"}
-        k = 2 * np.pi * ACROSS / float(np.linalg.norm(np.ptp(body.bounds, axis=0)))
+        # ten wavelengths across
+        k = 2 * np.pi * 10.0 / float(np.linalg.norm(np.ptp(body.bounds, axis=0)))
         fan = cr.launch(cr.DirectFlow(body), _line(body), wavenumber=k)
         losses = fan.losses()
         row |= {"fan s": time.process_time() - began, "stage": "field"}
         row["lost"] = None if losses is None else [float(share) for share in losses]
-        far = cr.far_field(fan, SEEN, wavenumber=k, boundary="hard")
+        far = cr.far_field(fan, [(1, 0, 0), (0, 1, 0), (0, 0, 1), (-0.6, 0.8, 0)], wavenumber=k, boundary="hard")
     except (ValueError, RuntimeError, MemoryError) as error:
         return row | {"refusal": f"{type(error).__name__}: {error}"}
     largest = int(np.argmax(np.abs(far.total)))
@@ -73,9 +68,9 @@ def far_field_of(path: Path, options: dict[str, Any]) -> Row:
 def _line(body: Any) -> cr.ShadowLine:
     """Shadow line of an incidence, or of another one if that is singular."""
     try:
-        return cr.shadow_line(body, INCIDENT)
+        return cr.shadow_line(body, (1.0, 0.4, 0.7))
     except cr.SingularIncidenceError:
-        return cr.shadow_line(body, BESIDE)
+        return cr.shadow_line(body, (0.9, 0.5, 0.7))
 
 
 def named_option(refusal: str, given: dict[str, Any]) -> dict[str, Any]:

@@ -35,13 +35,7 @@ BODIES = ("ellipsoid", "torus", "twisted", "gridded")
 EXPENSIVE = ("gridded",)
 """Bodies whose F takes a microsecond: fewer rays are integrated directly."""
 LENGTH = 8.0
-REPEATS = 5
-PENCIL, OPENING = 32, 0.02
-"""Rays of a pencil and its opening angle, rad."""
-SCIPY_RAYS = 16
 NS = 1e9 / LENGTH
-TUNED = (1e4, 3e4, 1e5, 3e5, 1e6)
-"""Numbers of rays for which maps are tuned, to find the one that pays soonest."""
 EXAMPLES: dict[str, tuple[Any, tuple[int, ...]]] = {
     "1 ellipsoid": (sc.Ellipsoid(1.2, 0.8, 0.8), (16, 64)),
     "2 torus": (sc.Torus(), (32, 64, 64)),
@@ -49,8 +43,6 @@ EXAMPLES: dict[str, tuple[Any, tuple[int, ...]]] = {
     "4 twisted": (sc.TwistedEllipsoid(), (24, 96)),
 }
 """Bodies and grids of [YC06b]."""
-PAPER = 200
-"""Points of the paper, whose error is (sum e^2)^(1/2)/N: the rms over the root of N."""
 
 
 @cache
@@ -75,12 +67,12 @@ def random_rays(shape: Any, count: int, seed: int = 11) -> FloatArray:
     return pack(*random_bundle_points(shape, count, rng=np.random.default_rng(seed)))
 
 
-def pencils(shape: Any, count: int) -> FloatArray:
-    """States (count, 6): narrow pencils from random points, consecutive rays being neighbours."""
-    x, p = random_bundle_points(shape, -(-count // PENCIL), rng=np.random.default_rng(12))
+def pencils(shape: Any, count: int, pencil: int = 32, opening: float = 0.02) -> FloatArray:
+    """States (count, 6): pencils of so many rays within an angle, rad, from random points, neighbour by neighbour."""
+    x, p = random_bundle_points(shape, -(-count // pencil), rng=np.random.default_rng(12))
     across = np.cross(normal(shape, x), p)
-    angle = np.tile(np.linspace(-OPENING / 2, OPENING / 2, PENCIL), len(x))[:, None]
-    x, p, across = (np.repeat(rows, PENCIL, axis=0) for rows in (x, p, across))
+    angle = np.tile(np.linspace(-opening / 2, opening / 2, pencil), len(x))[:, None]
+    x, p, across = (np.repeat(rows, pencil, axis=0) for rows in (x, p, across))
     return pack(x, p * np.cos(angle) + across * np.sin(angle))[:count]
 
 
@@ -108,7 +100,7 @@ def sample(name: str, count: int, seed: int = 11) -> Sample:
     return Sample(body(name), states, trace_states(body(name), states, np.array([LENGTH]), rtol=1e-13)[:, 0])
 
 
-def seconds_of(call: Callable[[], object], repeats: int) -> float:
+def seconds_of(call: Callable[[], object], repeats: int = 3) -> float:
     """Least processor time of the calls after one for warming up, s."""
     call()
     least = math.inf
@@ -119,7 +111,7 @@ def seconds_of(call: Callable[[], object], repeats: int) -> float:
     return least
 
 
-def seconds_each(flow: Any, states: FloatArray, repeats: int = REPEATS) -> float:
+def seconds_each(flow: Any, states: FloatArray, repeats: int = 5) -> float:
     """Processor time of one ray of LENGTH, s: the least of several measurements."""
     return seconds_of(lambda: flow.transport(states, np.array([LENGTH])), repeats) / len(states)
 
@@ -177,11 +169,11 @@ def card(flow: cr.PhaseMap) -> Row:
     return {"T0": flow.horizon, "MB": flow.nbytes / 1e6, "grid": f"{grid} p{flow.grid.degree} {leap.state.dtype}"}
 
 
-def scipy_at_error(fresh: Sample, target: float) -> tuple[float, float]:
+def scipy_at_error(fresh: Sample, target: float, rays: int = 16) -> tuple[float, float]:
     """Seconds a ray of scipy's DOP853 at the loosest tolerance whose error is <= target, and the error."""
 
     def run(exponent: float) -> FloatArray:
-        return scipy_flow(fresh.body, fresh.states[:SCIPY_RAYS], np.array([LENGTH]), rtol=10.0**exponent)[:, 0]
+        return scipy_flow(fresh.body, fresh.states[:rays], np.array([LENGTH]), rtol=10.0**exponent)[:, 0]
 
     loose, fine = -4.0, -13.0
     while loose - fine > 0.2:
@@ -190,7 +182,7 @@ def scipy_at_error(fresh: Sample, target: float) -> tuple[float, float]:
             fine = middle
         else:
             loose = middle
-    return seconds_of(lambda: run(fine), 1) / SCIPY_RAYS, rms(fresh.gaps(run(fine)))
+    return seconds_of(lambda: run(fine), 1) / rays, rms(fresh.gaps(run(fine)))
 
 
 def scipy_flow(shape: Any, states: FloatArray, times: FloatArray, *, rtol: float) -> FloatArray:
@@ -283,7 +275,10 @@ def long_leaps(names: tuple[str, ...] = BODIES, count: int = 65_536, samples: in
 
 
 def break_even(
-    names: tuple[str, ...] = BODIES, tuned: tuple[float, ...] = TUNED, count: int = 4096, samples: int = 4000
+    names: tuple[str, ...] = BODIES,
+    tuned: tuple[float, ...] = (1e4, 3e4, 1e5, 3e5, 1e6),
+    count: int = 4096,
+    samples: int = 4000,
 ) -> Iterator[Row]:
     """Rays from which a map and its build are faster than order 8 at the error of the map; us per ray."""
     for name in names:
@@ -342,7 +337,7 @@ def two_threads(names: tuple[str, ...] = ("ellipsoid", "twisted"), count: int = 
         rays = random_rays(body(name), count)
         for kind, flow in (("map", built(name)[0]), ("order 8", direct_at(name, 1e-6))):
             least = [math.inf, math.inf]
-            for _ in range(2 * REPEATS):
+            for _ in range(10):
                 for k in range(2):
                     with threads(k + 1):
                         started = time.perf_counter()
@@ -388,7 +383,8 @@ def one_leap(samples: int = 2000, tolerance: float = 1e-6) -> Iterator[Row]:
         seconds = seconds_of(partial(cr.build_phase_map, shape, cache=False, **options), 1)
         flow = cr.build_phase_map(shape, cache=False, **options)
         error = measure(flow, samples=samples, rng=np.random.default_rng(7))
-        row = {"example": name, "rms": error.rms, "paper": error.rms / PAPER**0.5, "max": error.max}
+        # the paper's error is (sum e^2)^(1/2)/N of 200 points: the rms over the root of N
+        row = {"example": name, "rms": error.rms, "paper": error.rms / 200**0.5, "max": error.max}
         yield row | {"build s": seconds, **card(flow)}
 
 

@@ -27,14 +27,13 @@ from creeping.shadow.curves import Curves
 from creeping.shadow.line import TOGETHER, shadow_lines
 from creeping.shadow.meshes import LineMeshes, critical_distances, judged, prepared, traced
 from creeping.shadow.refinement import FORBIDDEN
-from creeping.shadow.status import FOLLOWED, INCIDENCE_STATUSES, NEAR_SINGULAR, OK, SINGULAR
+from creeping.shadow.status import FOLLOWED, INCIDENCE_STATUSES, NEAR_SINGULAR, OK, SINGULAR, STATUSES
 from creeping.sweeping.request import sweep_request
 from creeping.sweeping.sweeper import Sweeper
 from studies import Row, main
 from studies.cost.flow_speed import body, seconds_of, threads
 
 LENGTH, RAYS = 4.0, 256
-REPEATS = 3
 BODIES = ("ellipsoid", "twisted", "torus", "gridded")
 TOLERANCES = (3e-5, 1e-6)
 FIELDS: dict[str, Any] = {
@@ -44,7 +43,6 @@ FIELDS: dict[str, Any] = {
     "n_rays": RAYS,
 }
 """Monostatic fields of a sweep."""
-ACCURACY = 1e-3
 LINE_BODIES: dict[str, Any] = {
     "ellipsoid": lambda: sc.Ellipsoid(1.2, 0.8, 0.8),
     "torus": sc.Torus,
@@ -52,7 +50,6 @@ LINE_BODIES: dict[str, Any] = {
     "peanut": lambda: sc.Implicit("(x**2 + y**2 + z**2 + 0.64)**2 - 2.56*x**2 - 0.6561"),
     "bumpy": lambda: sc.Implicit("x**2 + y**2 + z**2 - 1 - 0.3*sin(3*x)*sin(3*y)*sin(3*z)"),
 }
-SHARES = ("attached", "occluded", "concave")
 
 
 @cache
@@ -98,8 +95,8 @@ def fans(names: tuple[str, ...] = BODIES, count: int = 512, checked: int = 16) -
             for tolerance in TOLERANCES[: 1 if name == "gridded" else None]:
                 flow = flow_of(name, tolerance, direct)
                 sweeper = Sweeper(flow, sweep_request("rays", length=LENGTH, n_rays=n_rays))
-                whole = seconds_of(partial(sweeper, incidences), REPEATS) / n
-                line = seconds_of(partial(_lines, body(name), batches, n_rays), REPEATS) / n
+                whole = seconds_of(partial(sweeper, incidences)) / n
+                line = seconds_of(partial(_lines, body(name), batches, n_rays)) / n
                 row = {"body": name, "flow": "order 8" if direct else "map", "for": tolerance, "per s": 1 / whole}
                 row |= {"line us": 1e6 * line, "rays us": 1e6 * (whole - line)}
                 yield row | errors_of_rays(name, flow, incidences[:: max(1, n // checked)], n_rays)
@@ -120,7 +117,7 @@ def fields(names: tuple[str, ...] = BODIES[:3], count: int = 256) -> Iterator[Ro
         reference: Any = None
         for direct in (True, False):
             sweeper = Sweeper(flow_of(name, TOLERANCES[0], direct), request)
-            seconds = seconds_of(partial(sweeper, incidences), REPEATS) / count
+            seconds = seconds_of(partial(sweeper, incidences)) / count
             found = sweeper(incidences)
             reference = found if direct else reference
             gap = np.abs(found["creeping"] - reference["creeping"]) > 0.1 * np.abs(reference["creeping"])
@@ -147,7 +144,7 @@ def interpolated(name: str, directions: FloatArray, few: int) -> Row:
     flow = cr.build_phase_map(body(name), tolerance=TOLERANCES[0], length=LENGTH)
     some = np.sort(np.random.default_rng(0).choice(len(directions), min(few, len(directions)), replace=False))
     plain = partial(cr.sweep_directions, flow, directions[some], **FIELDS)
-    quick = partial(cr.sweep_directions, flow, directions, accuracy=ACCURACY, **FIELDS)
+    quick = partial(cr.sweep_directions, flow, directions, accuracy=1e-3, **FIELDS)
     alone, each = seconds_of(plain, 2) / len(some), seconds_of(quick, 2) / len(directions)
     known, found = plain(), quick()
     row = {"computed per s": 1 / alone, "between per s": 1 / each, "ratio": alone / each}
@@ -228,7 +225,7 @@ def independent(body: Any, directions: FloatArray) -> tuple[Lines, float]:
             lines.status[row] = SINGULAR
             continue
         lines.curves[row], lines.length[row] = len(line.curves), line.length
-        lines.shares[row] = [line.fractions[name] for name in SHARES]
+        lines.shares[row] = [line.fractions[name] for name in STATUSES]
     return lines, (time.process_time() - started) / n
 
 
@@ -242,7 +239,7 @@ def differences(found: Lines, exact: Lines) -> Row:
     for suffix, rows in (("", certain), (", all", both)):
         row[f"counts differ{suffix}"] = int(np.sum(found.curves[rows] != exact.curves[rows]))
         row[f"length{suffix}"] = float(np.max(length[rows], initial=0.0))
-        for k, name in enumerate(SHARES):
+        for k, name in enumerate(STATUSES):
             row[f"{name}{suffix}"] = float(np.max(share[rows, k], initial=0.0))
     return row | {"compared": int(both.sum())}
 
@@ -253,8 +250,7 @@ def measured(name: str, count: int, every: int) -> tuple[Row, Row, Row]:
     body, directions = LINE_BODIES[name](), fibonacci_directions(count)
     found = swept(body, directions)
     seconds, meshes = (
-        seconds_of(call, REPEATS) / count
-        for call in (partial(swept, body, directions), partial(on_mesh, body, directions, 0))
+        seconds_of(call) / count for call in (partial(swept, body, directions), partial(on_mesh, body, directions, 0))
     )
     second = int(np.sum(on_mesh(body, directions, 0).status != OK))
     third = int(np.sum(on_mesh(body, directions, 1).status != OK))

@@ -26,8 +26,6 @@ TWISTED, TORUS = sc.TwistedEllipsoid(a=0.5, b=0.5, c=1.0, d=0.2), sc.Torus(R=1.0
 LENGTH, SPACING = 1.5, 0.25
 """Of rays, and between iso-phase curves."""
 LEVELS = equal_times(SPACING, LENGTH)[1:]
-EARLY = LEVELS[:-1]
-"""Levels that rays of the twisted ellipsoid meet before they have faded by 30 dB at k rho = 10."""
 DISTANCES = (1.05, 1.5, 3.0, 30.0)
 """Of sources from the centre of a sphere, in its radii."""
 HEIGHTS = (0.0, 0.7, 3.0)
@@ -50,17 +48,18 @@ def creeping(path: Path, quick: bool) -> dict[str, Any]:
     lines = [cr.shadow_line(TWISTED, d) for d in incidences]
     fans = [cr.launch(flow, line, length=LENGTH, n_rays=64 if quick else 512) for line in lines]
     figure = new_figure((7.8, 6.0))
-    drawings = []
+    # levels that rays meet before they have faded by 30 dB at k rho = 10
+    drawings, early = [], LEVELS[:-1]
     for row, (fan, d) in enumerate(zip(fans, incidences, strict=True)):
         bottom = 0.525 - 0.46 * row
         places = (0.0, bottom, 0.36, 0.41), (0.425, bottom + 0.075, 0.455, 0.32)
-        drawings.append(_pair(figure, fan, cr.iso_phase_curves(fan, EARLY), *places, until=None))
+        drawings.append(_pair(figure, fan, cr.iso_phase_curves(fan, early), *places, until=None))
         name = f"$d$ = ({', '.join(map(str, d))})"
         panel(figure, "ac"[row], f"{name}, on the body", (0.01, bottom + 0.425))
         panel(figure, "bd"[row], f"{name}, over the angles", (0.38, bottom + 0.425))
     first = [float(fan.detachment.min()) if np.isfinite(fan.detachment).any() else None for fan in fans]
     told = {"directions": incidences, "launched": "attached", "earliest_detachment": first}
-    return _finished(path, quick, figure, drawings, fans, flow, (0.905, 0.31, 0.016, 0.42), told, EARLY)
+    return _finished(path, quick, figure, drawings, fans, flow, (0.905, 0.31, 0.016, 0.42), told, early)
 
 
 def torus(path: Path, quick: bool) -> dict[str, Any]:

@@ -18,7 +18,7 @@ def test_lines_agree_with_both_references():
         assert row["counts differ"] == 0
         # a sweep promises the length to 2e-6 at worst, and reaches what the tests ask elsewhere
         assert row["length"] < 10 * LINE_LENGTH
-        assert max(row[share] for share in sweep_speed.SHARES) < 10 * FRACTION
+        assert max(row[share] for share in sweep_speed.STATUSES) < 10 * FRACTION
 
 
 def test_fans_carry_their_errors():
