@@ -14,8 +14,8 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
-from creeping._typing import Any
 from creeping._version import __version__
 
 FIGURES = {

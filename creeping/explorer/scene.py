@@ -8,6 +8,8 @@ Colours of the wave move with its phase:
     colour = h Re(u e^{-i omega t})/|u|,   h = (20 log10 |u| - low)/(high - low), within 0..1
 
 so that waves are seen through the whole range of the colours, deep in the shadow too.
+
+Sources: Derivations, F3.
 """
 
 from dataclasses import dataclass
