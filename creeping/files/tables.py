@@ -12,7 +12,7 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.results.comparison import LEVELS, cross_section_decibels, decibels
+from creeping.field.results.comparison import LEVELS, cross_section_decibels, decibels, error_decibels
 from creeping.field.results.point_result import FieldStatus
 from creeping.geometry.checks import UNKNOWN, unit_of
 from creeping.rays.fan import RayFan
@@ -337,14 +337,12 @@ def write_couplings(
     pairs = np.nonzero(~np.eye(len(names), dtype=bool))
     per, unit, ports = len(pairs[0]), couplings[0].unit, np.array(names)
     values, error = (joined(getattr(one, name)[pairs] for one in couplings) for name in ("values", "error"))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        level, more = 20 * np.log10(np.abs(values)), 20 * np.log10(1 + error / np.abs(values))
     columns: list[Column] = [
         _wave_column(couplings, hertz, [per] * len(couplings)),
         ("source", "name of the port", np.tile(ports[pairs[0]], len(couplings))),
         ("receiver", "name of the port", np.tile(ports[pairs[1]], len(couplings))),
-        ("level_db", f"20 log10 of the field of a unit moment, re {unit}", level),
-        ("error_db", "by how much the level may be higher", more),
+        ("level_db", f"20 log10 of the field of a unit moment, re {unit}", decibels(values)),
+        ("error_db", "by how much the level may be higher", error_decibels(values, error)),
         ("re", f"real part, {unit}; time factor exp(-i w t)", values.real),
         ("im", f"imaginary part, {unit}", values.imag),
         ("status", "of FieldStatus", [FieldStatus(code).name for one in couplings for code in one.status[pairs]]),

@@ -252,13 +252,11 @@ def draw_curves(
     """
     colours = LevelColours.of(curves)
     for curve in curves:
-        # levels are read off the colour bar; a single one has none
-        label = "" if colours.high > colours.low or curve is not curves[0] else colours.words(curve.level)
         bound, free = (
             [piece for part in parts for piece in split_at_seam(part, closed=False)]
             for parts in _strokes.curve_pieces(curve, fan, curve.parameters, ends)
         )
-        colour = colours(curve.level)
+        colour, label = colours(curve.level), colours.label(curve is curves[0])
         _add(ax, bound, color=colour, linewidth=1.0, label=label, zorder=3)
         _add(ax, free, color=colour, linewidth=_strokes.FADED_WIDTH, alpha=_strokes.FADED, zorder=3)
     return colours

@@ -24,7 +24,7 @@ def test_words(fan):
 
 def test_pictures_say_metres(fan, monkeypatch, tmp_path):
     curves = cr.iso_phase_curves(fan, [0.5, 1.0])
-    assert _strokes.LevelColours.of(curves).words(0.5) == "travel time = 0.5 m"
+    assert _strokes.LevelColours.of(curves[:1]).label(True) == "travel time = 0.5 m"
     ax = line_plots.plot_line(fan.line, fan=fan, curves=curves)
     labels = [one.get_ylabel() for one in (*ax.figure.axes, *ax.child_axes)]
     assert "iso-phase curves: travel time (m)" in labels

@@ -229,6 +229,18 @@ def decibels(values: ArrayLike) -> FloatArray:
         return np.asarray(20 * np.log10(np.abs(np.asarray(values))))
 
 
+def error_decibels(values: ArrayLike, error: ArrayLike) -> FloatArray:
+    """By how many decibels |values| + error lies above |values|, (...) -> (...).
+
+    Examples
+    --------
+    >>> error_decibels([1.0, 0.0], [1.0, 1.0]).round(2).tolist()
+    [6.02, inf]
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(20 * np.log10(1 + np.asarray(error) / np.abs(np.asarray(values))))
+
+
 def cross_section_decibels(values: ArrayLike) -> FloatArray:
     """10 log10(4π|f|²) of far fields f, L: dB relative to L^2, dBsm if L is the metre, (...) -> (...)."""
     return np.asarray(decibels(values) + 10 * np.log10(4 * np.pi))
@@ -398,9 +410,7 @@ class Echo(Drawn, Tabled):
 
     def summary(self) -> dict[str, Any]:
         """Sizes, largest level of each channel, error and number of unresolved values, by name."""
-        levels, size = self.levels(), np.abs(self.total)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            off = 20 * np.log10(1 + self.error / size)
+        levels, off = self.levels(), error_decibels(self.total, self.error)
         known = off[np.isfinite(off)]
         return {
             "quantity": LEVELS[self.quantity][0],
