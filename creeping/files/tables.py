@@ -83,14 +83,14 @@ def write_csv(
         "far": (far, lambda one: _far_columns(one, observed)),
         "cut": (cut, _cut_columns),
     }
-    given = {name: maker(what) for name, (what, maker) in makers.items() if what is not None}
+    given = {name: pair for name, pair in makers.items() if pair[0] is not None}
     if len(given) != 1:
         raise InvalidInputError(
             f"write_csv got {' and '.join(given) or 'nothing'}; give exactly one of {', '.join(makers)}, "
             "a file for each"
         )
-    (columns,) = given.values()
-    _write_table(path, columns, mark)
+    ((what, columns_of),) = given.values()
+    _write_table(path, columns_of(what), mark)
 
 
 def _write_table(path: str | os.PathLike[str], columns: Sequence[Column], mark: str = "") -> None:
