@@ -162,19 +162,8 @@ class EchoOptions:
 AS_USUAL = EchoOptions()
 
 
-BODIES = {
-    "sphere": "Sphere",
-    "ellipsoid": "Ellipsoid",
-    "torus": "Torus",
-    "twisted-ellipsoid": "TwistedEllipsoid",
-    "cylinder": "Cylinder",
-    "capsule": "Capsule",
-    "cone": "Cone",
-    "cone-sphere": "ConeSphere",
-    "ogive": "Ogive",
-    "double-ogive": "DoubleOgive",
-    "almond": "Almond",
-}
+BODIES = "sphere ellipsoid torus twisted-ellipsoid cylinder capsule cone cone-sphere ogive double-ogive almond".split()
+"""Names of the classes of `scatterers`, in small letters."""
 MESHES = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf", ".msh", ".bdf", ".nas", ".mesh", ".gz")
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
 
@@ -257,7 +246,7 @@ def _with_charts(shape: Any, progress: Tell | None) -> Any:
 def _named(name: str, rest: str, speed: str | None) -> Any:
     import scatterers
 
-    make = getattr(scatterers, BODIES[name])
+    make = getattr(scatterers, name.title().replace("-", ""))
     known = {key: p for key, p in inspect.signature(make).parameters.items() if key != "speed"}
     values: dict[str, Any] = {}
     for item in filter(None, rest.split(",")):

@@ -32,6 +32,15 @@ from studies import Row, main
 from studies.accuracy.bodies import rms
 
 BODIES = ("ellipsoid", "torus", "twisted", "gridded")
+SHAPES: dict[str, Callable[[], Any]] = {
+    "ellipsoid": lambda: sc.Ellipsoid(1.2, 0.8, 0.8),
+    "triaxial": lambda: sc.Ellipsoid(1.37, 0.91, 0.66),
+    "torus": sc.Torus,
+    "twisted": sc.TwistedEllipsoid,
+    "gridded": lambda: sc.Gridded.sampled(sc.TwistedEllipsoid(), 64),
+    "peanut": lambda: sc.Implicit("(x**2 + y**2 + z**2 + 0.64)**2 - 2.56*x**2 - 0.6561"),
+    "bumpy": lambda: sc.Implicit("x**2 + y**2 + z**2 - 1 - 0.3*sin(3*x)*sin(3*y)*sin(3*z)"),
+}
 EXPENSIVE = ("gridded",)
 """Bodies whose F takes a microsecond: fewer rays are integrated directly."""
 LENGTH = 8.0
@@ -48,18 +57,7 @@ EXAMPLES: dict[str, tuple[Any, tuple[int, ...]]] = {
 @cache
 def body(name: str) -> Any:
     """Body of a name; "gridded" is the twisted ellipsoid given by samples on 64^3 nodes."""
-    match name:
-        case "ellipsoid":
-            return sc.Ellipsoid(1.2, 0.8, 0.8)
-        case "triaxial":
-            return sc.Ellipsoid(1.37, 0.91, 0.66)
-        case "torus":
-            return sc.Torus()
-        case "twisted":
-            return sc.TwistedEllipsoid()
-        case "gridded":
-            return sc.Gridded.sampled(sc.TwistedEllipsoid(), 64)
-    raise KeyError(name)
+    return SHAPES[name]()
 
 
 def random_rays(shape: Any, count: int, seed: int = 11) -> FloatArray:

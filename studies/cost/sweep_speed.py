@@ -43,13 +43,7 @@ FIELDS: dict[str, Any] = {
     "n_rays": RAYS,
 }
 """Monostatic fields of a sweep."""
-LINE_BODIES: dict[str, Any] = {
-    "ellipsoid": lambda: sc.Ellipsoid(1.2, 0.8, 0.8),
-    "torus": sc.Torus,
-    "twisted": sc.TwistedEllipsoid,
-    "peanut": lambda: sc.Implicit("(x**2 + y**2 + z**2 + 0.64)**2 - 2.56*x**2 - 0.6561"),
-    "bumpy": lambda: sc.Implicit("x**2 + y**2 + z**2 - 1 - 0.3*sin(3*x)*sin(3*y)*sin(3*z)"),
-}
+LINE_BODIES = ("ellipsoid", "torus", "twisted", "peanut", "bumpy")
 
 
 @cache
@@ -247,13 +241,13 @@ def differences(found: Lines, exact: Lines) -> Row:
 @cache
 def measured(name: str, count: int, every: int) -> tuple[Row, Row, Row]:
     """One body: cost and statuses, then errors against the finest mesh and against the independent line."""
-    body, directions = LINE_BODIES[name](), fibonacci_directions(count)
-    found = swept(body, directions)
+    shape, directions = body(name), fibonacci_directions(count)
+    found = swept(shape, directions)
     seconds, meshes = (
-        seconds_of(call) / count for call in (partial(swept, body, directions), partial(on_mesh, body, directions, 0))
+        seconds_of(call) / count for call in (partial(swept, shape, directions), partial(on_mesh, shape, directions, 0))
     )
-    second = int(np.sum(on_mesh(body, directions, 0).status != OK))
-    third = int(np.sum(on_mesh(body, directions, 1).status != OK))
+    second = int(np.sum(on_mesh(shape, directions, 0).status != OK))
+    third = int(np.sum(on_mesh(shape, directions, 1).status != OK))
     first: Row = {"body": name, "us a line": 1e6 * seconds, "on the first mesh": 1e6 * meshes}
     for code in (OK, NEAR_SINGULAR, FOLLOWED, SINGULAR):
         first[INCIDENCE_STATUSES[code].split(":")[0]] = int(np.sum(found.status == code))
@@ -261,26 +255,26 @@ def measured(name: str, count: int, every: int) -> tuple[Row, Row, Row]:
     first |= {"need mesh 2": second, "need mesh 3": third}
     counts = np.unique(found.curves[np.isfinite(found.curves)]).astype(int)
     first |= {"curves seen": " ".join(map(str, counts)), "least v": float(least) if np.isfinite(least) else np.nan}
-    exact = on_mesh(body, directions, 2)
+    exact = on_mesh(shape, directions, 2)
     # what even the finest mesh is not certain of is no reference
     exact.length[exact.status == FOLLOWED] = np.nan
-    one_by_one, each = independent(body, directions[::every])
+    one_by_one, each = independent(shape, directions[::every])
     few = Lines(*(values[::every] for values in found))
     against = {"body": name, "s a line": each, **differences(few, one_by_one)}
     return first, {"body": name, **differences(found, exact)}, against
 
 
-def lines(names: tuple[str, ...] = tuple(LINE_BODIES), count: int = 1000, every: int = 10) -> Iterator[Row]:
+def lines(names: tuple[str, ...] = LINE_BODIES, count: int = 1000, every: int = 10) -> Iterator[Row]:
     """Cost of a line (and without following single lines), statuses, meshes and curves of Fibonacci incidences."""
     return (measured(name, count, every)[0] for name in names)
 
 
-def finest(names: tuple[str, ...] = tuple(LINE_BODIES), count: int = 1000, every: int = 10) -> Iterator[Row]:
+def finest(names: tuple[str, ...] = LINE_BODIES, count: int = 1000, every: int = 10) -> Iterator[Row]:
     """Against the finest mesh: counts that differ and worst errors, of certain lines and of all."""
     return (measured(name, count, every)[1] for name in names)
 
 
-def panels(names: tuple[str, ...] = tuple(LINE_BODIES), count: int = 1000, every: int = 10) -> Iterator[Row]:
+def panels(names: tuple[str, ...] = LINE_BODIES, count: int = 1000, every: int = 10) -> Iterator[Row]:
     """Against shadow_line, some of them: the same."""
     return (measured(name, count, every)[2] for name in names)
 
