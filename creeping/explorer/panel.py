@@ -25,7 +25,7 @@ from creeping.plotting.far_cuts import component_name
 from creeping.plotting.line_plots import is_torus
 from creeping.plotting.pages import COLOURS, EXACT
 from creeping.rays.fan import RayFan
-from creeping.rays.isophase import split_at_seam
+from creeping.rays.isophase import IsoPhaseCurve
 
 _TEXT = 'font-size="11" font-family="sans-serif" fill="#333"'
 WIDTH, LEFT, RIGHT, TOP, BOTTOM = 360.0, 40.0, 13.0, 8.0, 34.0
@@ -86,42 +86,39 @@ class _Axes:
 
 
 def plane_svg(found: Refined) -> str:
-    """Shadow line, rays and iso-phase curves over (phi, theta), degrees."""
-    body, fan = found.fan.body, found.fan
-    rays = _flat(body.parameters(fan.points[k]) for k in _some(fan, 48))
-    curves = [
-        (curve.level / fan.length, [np.degrees(piece[:, ::-1]) for piece in curve.parameter_pieces])
-        for curve in requested_curves(found.request, fan)
-    ]
-    line = {status: _flat(map(body.parameters, line_pieces(found.line, status))) for status in STATUS_COLOURS}
-    return _plane(is_torus(found.line), rays, curves, line)
+    """Shadow line, rays and iso-phase curves over (phi, theta), degrees, with gaps of a step at the seam."""
+    lines = {status: line_pieces(found.line, status) for status in STATUS_COLOURS}
+    return _plane(found.fan, requested_curves(found.request, found.fan), lines, rays=48)
 
 
 def preview_plane_svg(frame: Preview) -> str:
-    """The same while the hand moves: fewer rays and points, of the line what is attached, gaps at the seam."""
-    body, fan = frame.fan.body, frame.fan
-    chosen = _some(fan, 24)
-    rays = _broken(body.parameters(fan.points[chosen, ::2])) if len(chosen) else []
-    curves = []
-    for curve in frame.curves:
-        points = curve.parameters[:: 1 + len(curve.parameters) // 100]
+    """The same while the hand moves: fewer rays and points, of the line what is attached."""
+    return _plane(frame.fan, frame.curves, {"attached": frame.launch_arcs}, rays=24, most=100)
+
+
+def _plane(
+    fan: RayFan,
+    curves: Sequence[IsoPhaseCurve],
+    lines: dict[str, list[FloatArray]],
+    *,
+    rays: int,
+    most: int | None = None,
+) -> str:
+    """So many rays, curves of ``most`` points, and lines by status (n, 3) over the parameters."""
+    body, torus = fan.body, is_torus(fan.line)
+    axes = _Axes((-180, 180), (-180, 180) if torus else (180, 0), WIDTH if torus else 0.56 * WIDTH)
+    chosen = _some(fan, rays)
+    drawn = _broken(body.parameters(fan.points[chosen, :: 2 if most else 1])) if chosen else []
+    parts = [axes.lines(drawn, RAY_COLOUR, 0.5, 0.6)]
+    for curve in curves:
+        points = curve.parameters[:: 1 + len(curve.parameters) // (most or len(curve.parameters) + 1)]
         if curve.closed:
             points = np.concatenate([points, points[:1]])
-        curves.append((curve.level / fan.length, _broken(points[None])))
-    line = [piece for arc in frame.launch_arcs for piece in _broken(body.parameters(arc)[None])]
-    return _plane(is_torus(fan.line), rays, curves, {"attached": line})
-
-
-Pieces = list[FloatArray]
-
-
-def _plane(torus: bool, rays: Pieces, curves: list[tuple[float, Pieces]], lines: dict[str, Pieces]) -> str:
-    """Pieces (k, 2) of rays, of curves by the share of their level, and of lines by status: phi and theta, degrees."""
-    axes = _Axes((-180, 180), (-180, 180) if torus else (180, 0), WIDTH if torus else 0.56 * WIDTH)
-    parts = [axes.lines(rays, RAY_COLOUR, 0.5, 0.6)]
-    parts += [axes.lines(pieces, _hex(LEVEL_COLOURS, share), 0.9) for share, pieces in curves]
+        parts.append(axes.lines(_broken(points[None]), _hex(LEVEL_COLOURS, curve.level / fan.length), 0.9))
     dashes = {"attached": "", "occluded": "6,2", "concave": "2,2"}
-    parts += [axes.lines(p, STATUS_COLOURS[s], 1.8, dashes=dashes[s]) for s, p in lines.items()]
+    for status, arcs in lines.items():
+        pieces = [piece for arc in arcs for piece in _broken(body.parameters(arc)[None])]
+        parts.append(axes.lines(pieces, STATUS_COLOURS[status], 1.8, dashes=dashes[status]))
     return _picture("plane", axes.height, [*parts, _plane_frame(torus)])
 
 
@@ -193,11 +190,6 @@ def _broken(parameters: FloatArray) -> list[FloatArray]:
         ends = [0, *(np.flatnonzero(jumps[k]) + 1).tolist(), flat.shape[1]]
         pieces += [flat[k, a:b] for a, b in pairwise(ends) if b - a > 1]
     return [piece for piece in pieces if np.isfinite(piece[0, 0])]
-
-
-def _flat(curves: Iterable[FloatArray]) -> list[FloatArray]:
-    """Pieces (phi, theta) in degrees of curves of parameters, cut at the seam."""
-    return [np.degrees(p[:, ::-1]) for curve in curves for p in split_at_seam(curve, closed=False)]
 
 
 def _picture(name: str, height: float, parts: Iterable[str]) -> str:
