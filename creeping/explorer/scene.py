@@ -36,8 +36,6 @@ CELLS = 44
 
 Bytes = NDArray[np.uint8]
 Span = tuple[float, float]
-MOST, LEAST = 60.0, 10.0
-"""Largest and smallest range of the field's colours, dB."""
 ENDED = (150, 156, 162)
 """Colour where a ray has ended or no ray passes."""
 _SHARE = np.arange(256) / 255
@@ -76,7 +74,7 @@ def wave_colours(strength: ComplexArray, phase: float) -> Bytes:
 
 
 def fitted_span(levels: FloatArray | None, before: Span | None = None) -> Span:
-    """Range of colours that fits decibels (...), relative to the incident wave; the one before while that fits too.
+    """Range of colours, 10 to 60 dB, that fits decibels (...) of the incident wave; the one before while that fits too.
 
     Neither the few points beside a caustic nor those in the deepest shadow stretch it.
     """
@@ -85,10 +83,10 @@ def fitted_span(levels: FloatArray | None, before: Span | None = None) -> Span:
         return before or (-50.0, 5.0)
     least, most = np.percentile(finite, [1.0, 99.0])
     # by so much data may leave their range or fall short of it: it does not flicker
-    if before and abs(most - before[1]) < 7.5 and abs(max(least, most - MOST) - before[0]) < 7.5:
+    if before and abs(most - before[1]) < 7.5 and abs(max(least, most - 60.0) - before[0]) < 7.5:
         return before
-    low, high = shown_range([np.array([least, most])], MOST)
-    return min(low, high - LEAST), high
+    low, high = shown_range([np.array([least, most])], span=60.0)
+    return min(low, high - 10.0), high
 
 
 def field_colours(levels: FloatArray, span: Span) -> Bytes:

@@ -287,11 +287,6 @@ def current_levels(currents: SurfaceCurrents, points: FloatArray, incident: str 
 
     |n x H| of a conductor, of one incident polarisation or the root mean square of both; |u|, |du/dn|/k if soft.
     """
-    return decibels(_magnitudes(currents, points, incident))
-
-
-def _magnitudes(currents: SurfaceCurrents, points: FloatArray, incident: str | None) -> FloatArray:
-    """Magnitude of the currents at points of the body (n, 3), NaN where there are none: (n,)."""
     conductor = currents.values.ndim > 1
     if incident is not None and (incident not in COMPONENTS or not conductor):
         raise InvalidInputError(f"incident = {incident!r} is not {' or '.join(COMPONENTS)}, of a conductor's currents")
@@ -302,7 +297,7 @@ def _magnitudes(currents: SurfaceCurrents, points: FloatArray, incident: str | N
         size = np.sqrt(np.mean(each**2, axis=1)) if incident is None else each[:, COMPONENTS.index(incident)]
     elif currents.boundary.kind == "soft":
         size = size / currents.wavenumber
-    return np.where(covered, size, np.nan)
+    return decibels(np.where(covered, size, np.nan))
 
 
 def _currents_at(currents: SurfaceCurrents, points: FloatArray) -> tuple[ComplexArray, BoolArray]:

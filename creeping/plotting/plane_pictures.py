@@ -21,8 +21,6 @@ from creeping.geometry.parts import inside, why_no_rays
 from creeping.plotting import pages
 from creeping.plotting.coloured_body import LEAST_SAMPLES, NOTHING, at_phase
 
-FRONT = "#ffffff"
-"""Colour of wave fronts."""
 HATCH, HATCHED = "///", "#6d767d"
 DOUBTFUL = "#a3476a", "#ffffff"
 """Colours in the legend of what is hatched upon the colours of the field."""
@@ -165,7 +163,7 @@ def _draw(
     _paint(cut, ax, values, label, pages.beyond(values, look["vmin"], look["vmax"]), look)
     if _with_fronts(cut, show, fronts):
         shown = np.where(missing, np.nan, _filled(wave, cut.outside))
-        ax.contour(cut.across, cut.up, shown, [0.0], colors=FRONT, linewidths=0.5, alpha=0.6, zorder=1.4)
+        ax.contour(cut.across, cut.up, shown, [0.0], colors="white", linewidths=0.5, alpha=0.6, zorder=1.4)
     hatch(cut, ax, size)
     dress(cut, ax)
 
@@ -347,7 +345,7 @@ def add_cut_legend(cut: FieldCut, ax: Any, *, fresh: bool, fronts: bool = False)
     if fronts:
         # white on white would not be seen
         around = [withStroke(linewidth=4.0, foreground="#8c4a6e")]
-        handles.append(Line2D([], [], color=FRONT, linewidth=1.0, path_effects=around, label="wave front"))
+        handles.append(Line2D([], [], color="white", linewidth=1.0, path_effects=around, label="wave front"))
     if words := status_words(cut):
         face, edge = (NOTHING, HATCHED) if np.any(missing_of(cut)) else DOUBTFUL
         handles.append(Patch(facecolor=face, edgecolor=edge, linewidth=0, hatch=HATCH, label=f"not OK: {words}"))

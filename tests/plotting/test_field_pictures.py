@@ -109,10 +109,10 @@ def test_picture_of_the_currents(tmp_path, fan, boundary):
 
 def test_currents_between_nodes(fan):
     # those of the sphere, 2 |n.d| h and the like, and none beyond the rays
-    from creeping.plotting.coloured_body import _magnitudes
+    from creeping.plotting.coloured_body import current_levels
 
     currents = cr.surface_currents(fan, wavenumber=K, boundary="hard")
-    found = _magnitudes(currents, at([5.0, 60.0, 95.0]), None)
+    found = 10 ** (current_levels(currents, at([5.0, 60.0, 95.0])) / 20)
     np.testing.assert_allclose(
         found, np.abs(sphere.surface_field(K, 1.0, -np.cos(np.radians([5.0, 60.0, 95.0])), "hard")), rtol=0.03
     )
