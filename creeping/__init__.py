@@ -9,7 +9,7 @@ import lazy_loader
 from creeping._presenting import present_with
 
 # by name: results show themselves by what only plotting knows, and import it when first asked
-present_with("creeping.plotting.presenter")
+present_with("creeping.plotting")
 
 _known, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 _GUESSED = {

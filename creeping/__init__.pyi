@@ -30,11 +30,11 @@ from .field.ports.couplings import slot_coupling as slot_coupling
 from .field.ports.port_map import PortField as PortField
 from .field.ports.port_map import port_field as port_field
 from .field.results.comparison import Comparison as Comparison
+from .field.results.comparison import Echo as Echo
 from .field.results.comparison import compare as compare
 from .field.results.conductor_result import ConductorCurrent as ConductorCurrent
 from .field.results.conductor_result import ConductorField as ConductorField
 from .field.results.conductor_result import Fields as Fields
-from .field.results.echo import Echo as Echo
 from .field.results.far_result import FarField as FarField
 from .field.results.impulse import ImpulseResponse as ImpulseResponse
 from .field.results.impulse import RangeProfile as RangeProfile

@@ -4,7 +4,7 @@ import numpy as np
 
 import creeping as cr
 import scatterers as sc
-from creeping.field.results.echo import Echo
+from creeping.field.results.comparison import Echo
 
 HOSTILE = "<script>alert('x')</script>&\"$\\frac"
 

@@ -18,7 +18,7 @@ from cyclopts import Parameter
 
 from creeping._progress import Progress
 from creeping.commands import options
-from creeping.commands.body import parse_body, title_of
+from creeping.commands.options import parse_body, title_of
 
 Port = Annotated[
     list[str],
@@ -35,10 +35,6 @@ Kind = Annotated[
         "is of point sources on a hard body."
     ),
 ]
-Frequency = Annotated[
-    str | None, Parameter(help='One, e.g. "10GHz", or a band FIRST:LAST:STEP, e.g. "8:12:0.1GHz": lengths are metres.')
-]
-Wavenumber = Annotated[float | None, Parameter(help="Instead of a frequency: k, 1/L.")]
 Size = Annotated[
     float | None,
     Parameter(
@@ -69,9 +65,7 @@ def coupling(
     *,
     port: Port,
     kind: Kind = "auto",
-    frequency: Frequency = None,
-    wavenumber: Wavenumber = None,
-    sound_speed: options.SoundSpeed = None,
+    wave: options.WaveOptions = options.NO_WAVE,
     file: options.FileOptions = options.AS_IT_IS,
     size: Size = None,
     output: Folder = Path("out"),
@@ -86,7 +80,7 @@ def coupling(
 
     started = time.perf_counter()
     ports = parse_ports(port, kind)
-    k, hertz = _waves(wavenumber, frequency, sound_speed)
+    k, hertz = _waves(wave)
     if size is not None and not 0 < size < float("inf"):
         raise InvalidInputError(f"--size {size!r} is not a positive finite number")
     if size is not None and len(set(ports.kinds)) > 1:
@@ -106,7 +100,7 @@ def coupling(
             found.append(of_one if hertz is None else replace(of_one, length_unit="m"))
             progress.told(number + 1, len(k))
     output.mkdir(parents=True, exist_ok=True)
-    files = _write(output, ports, found, hertz, size, sound_speed)
+    files = _write(output, ports, found, hertz, size, wave.sound_speed)
     from creeping.plotting.coupling_pictures import MOST_CURVES
 
     pairs = len(ports.names) * (len(ports.names) - 1) // 2
@@ -169,19 +163,20 @@ def parse_ports(texts: Sequence[str], kind: str) -> Ports:
     return Ports(tuple(name for name, _, _ in rows), np.array([place for _, place, _ in rows]), kinds, axes)
 
 
-def _waves(wavenumber: float | None, frequency: str | None, sound_speed: float | None) -> tuple[Any, Any]:
-    """Wavenumbers (n,), 1/L, and their frequencies, Hz, or None."""
+def _waves(wave: options.WaveOptions) -> tuple[Any, Any]:
+    """Wavenumbers (n,), 1/L, and their frequencies, Hz, or None: of a band FIRST:LAST:STEP, e.g. "8:12:0.1GHz"."""
     import numpy as np
 
     from creeping.commands.forecast import asked_wavenumber
     from creeping.field.frequency import frequency as hertz_of
     from creeping.field.frequency import wavenumber as wavenumber_of
 
-    if frequency is not None and wavenumber is None and ":" in frequency:
-        k = np.atleast_1d(wavenumber_of(frequency, sound_speed=sound_speed))
+    speed = wave.sound_speed
+    if wave.frequency is not None and wave.wavenumber is None and ":" in wave.frequency:
+        k = np.atleast_1d(wavenumber_of(wave.frequency, sound_speed=speed))
         # as typed: k and back leaves rounding
-        return k, np.array([float(f"{one:.12g}") for one in np.atleast_1d(hertz_of(k, sound_speed=sound_speed))])
-    one, hertz, _ = asked_wavenumber(wavenumber, frequency, None, sound_speed)
+        return k, np.array([float(f"{one:.12g}") for one in np.atleast_1d(hertz_of(k, sound_speed=speed))])
+    one, hertz, _ = asked_wavenumber(wave)
     return np.array([one]), None if hertz is None else np.array([float(f"{hertz:.12g}")])
 
 

@@ -8,14 +8,8 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from creeping.commands import options
-from creeping.commands.body import CAD, MESHES, is_file, parse_body
+from creeping.commands.options import CAD, MESHES, is_file, parse_body
 
-Wavenumber = Annotated[
-    float | None,
-    Parameter(
-        group=options.FIELD, help="k, 1/L: whether the field's expansions reach there; a file's size in wavelengths."
-    ),
-]
 Output = Annotated[
     Path | None, Parameter(name=["-o", "--output"], help="Folder for quality.png, a file's mesh where it is rough.")
 ]
@@ -26,26 +20,23 @@ def check(
     *,
     speed: options.SpeedOption = None,
     file: options.FileOptions = options.AS_IT_IS,
-    wavenumber: Wavenumber = None,
-    frequency: options.Frequency = None,
-    wavelength: options.Wavelength = None,
-    sound_speed: options.SoundSpeed = None,
+    wave: options.WaveOptions = options.NO_WAVE,
     output: Output = None,
     json_: options.Json = False,
 ) -> int:
     """Verify a body: derivatives, closedness, orientation, cover and overlap of its charts; of a file its quality too.
 
-    Exit code 3 if something is wrong.
+    With a wave also whether the field's expansions reach there, and a file's size in wavelengths. Exit code 3 if
+    something is wrong.
     """
     from creeping.errors import InvalidInputError
 
-    if wavenumber is not None and not 0 < wavenumber < float("inf"):
-        raise InvalidInputError(f"--wavenumber {wavenumber!r} is not a positive finite number")
+    wavenumber: float | None = None
     asked: dict[str, Any] = {}
-    if any(value is not None for value in (wavenumber, frequency, wavelength, sound_speed)):
+    if wave != options.NO_WAVE:
         from creeping.commands.forecast import asked_wavenumber
 
-        wavenumber, hertz, cure = asked_wavenumber(wavenumber, frequency, wavelength, sound_speed)
+        wavenumber, hertz, cure = asked_wavenumber(wave)
         asked = {"metres": hertz is not None, "cure": cure}
     mesh = is_file(body) and Path(body).suffix.lower() not in CAD
     if wavenumber is not None and speed is not None:
@@ -157,7 +148,7 @@ def _mesh(
     if output is None:
         return
     from creeping.commands.resuming import make_folder
-    from creeping.plotting.coloured_body import MeshValues, mesh_picture
+    from creeping.plotting.pictures import MeshValues, mesh_picture
 
     make_folder(output)
     shown = MeshValues(mesh.vertices, mesh.triangles, quality.badness, quality.bad, Path(body).name)

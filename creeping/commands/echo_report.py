@@ -13,18 +13,17 @@ from creeping import plotting
 from creeping._progress import Progress
 from creeping._typing import FloatArray
 from creeping._version import __version__
-from creeping.commands.body import each_once
 from creeping.commands.echo_request import EchoJob, EchoRequest
 from creeping.commands.forecast import boundary_words, forecast
-from creeping.commands.resuming import SUMMARY, asked_for, begun, kept
+from creeping.commands.options import title_of
+from creeping.commands.resuming import SUMMARY, Unfinished, asked_for, begun, kept
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import parse_boundary
 from creeping.field.frequency import frequency
-from creeping.field.results.comparison import Comparison, compare
-from creeping.field.results.echo import LEVELS, Echo
+from creeping.field.results.comparison import LEVELS, Comparison, Echo, compare
 from creeping.field.results.impulse import RangeProfile, range_profile
 from creeping.field.tmatrix.patterns import Averages
-from creeping.files import averaged_levels, read_cut, write_averages, write_echo, write_mat, write_profile
+from creeping.files import averaged_levels, write_averages, write_echo, write_mat, write_profile
 from creeping.files.measured import MeasuredCut
 from creeping.geometry.checks import WRONG_SIGNS, wrong_signs
 from creeping.geometry.directions import directions_from_azimuth_elevation
@@ -37,27 +36,51 @@ from creeping.sweeping.over_wavenumbers import averages_of, t_matrices
 
 
 def run_echo(job: EchoJob, shape: Any, progress: Progress) -> str:
-    """Compute and write an echo: what there is to say of it."""
-    request, given, body = job.request, job.given, job.body
-    method, output, quantity = given.method, given.output or Path(request.quantity), request.quantity
-    boundary, mono, k = parse_boundary(request.boundary), request.monostatic, request.wavenumbers
-    words = job.asked | {"method": method} | job.file.given() | {"pictures": given.pictures, "formats": given.formats}
-    words |= {"compare": given.compare, "column": given.column, "align": given.align}
-    formats = each_once("--format", given.formats, ("csv", "mat"))
-    reference = reference_of(request, given.compare, given.column, given.align)
-    azimuths, elevations = request.angles(shape)
-    count = len(azimuths)
-    served = monostatic_method(shape, k, boundary, count) if method == "auto" and mono else method
-    radar, observers = ((azimuths, elevations), 1) if mono else (request.incidence, count)
-    seen: dict[str, Any] = {"radar": radar, "observers": observers, "metres": True, "cure": request.cure}
-    told = forecast(shape, k, boundary, method=served, **seen)
+    """Compute and write an echo, or means over orientation: what there is to say of it."""
+    request, given, k = job.request, job.given, job.request.wavenumbers
+    output, boundary = given.output or Path(request.quantity), parse_boundary(request.boundary)
+    angles, seen = None, dict[str, Any](method="t-matrix")
+    words = job.asked | {"average": True} | job.file.given() | {"pictures": given.pictures}
+    if not given.average:
+        words = job.asked | {"method": given.method} | job.file.given() | {"pictures": given.pictures}
+        words |= {name: getattr(given, name) for name in ("formats", "compare", "column", "align")}
+        angles = request.angles(shape)
+        count, mono = len(angles[0]), request.monostatic
+        seen = {"radar": angles if mono else request.incidence, "observers": 1 if mono else count}
+        auto = given.method == "auto" and mono
+        seen["method"] = monostatic_method(shape, k, boundary, count) if auto else given.method
+    told = forecast(shape, k, boundary, metres=True, cure=request.cure, **seen)
     progress.note(f"{told.body}, {boundary_words(boundary)}")
-    unfinished = begun(output, quantity, asked_for(body, shape, **words), resume=given.resume)
+    unfinished = begun(output, request.quantity, asked_for(job.body, shape, **words), resume=given.resume)
     if unfinished is None:
         return (output / SUMMARY).read_text() if given.json_ else f"nothing is missing in {output}"
-    frequencies = f"{len(k)} frequenc{'ies' if len(k) > 1 else 'y'}"
-    progress(f"{count} angle{'s' * (count > 1)} x {frequencies} by {told.by}")
+    with kept(unfinished, progress.message):
+        if angles is None:
+            summary = _averages(job, shape, unfinished, progress, told.by)
+        else:
+            summary = _echo(job, shape, angles, unfinished, progress, told.by)
+        summary["files"].append(SUMMARY)
+        unfinished.write_summary(summary, complete=True)
+    summary |= {"complete": True, "seconds": round(time.perf_counter() - job.started, 2)}
+    say = _readable_averages if given.average else readable
+    return json.dumps(summary, indent=1) if given.json_ else say(summary, output)
+
+
+def _echo(
+    job: EchoJob,
+    shape: Any,
+    angles: tuple[FloatArray, FloatArray],
+    unfinished: Unfinished,
+    progress: Progress,
+    by: str,
+) -> dict[str, Any]:
+    """Compute and write an echo; returns the summary."""
+    request, given, k = job.request, job.given, job.request.wavenumbers
+    output, quantity, method = unfinished.output, request.quantity, given.method
+    count = len(angles[0])
     values = count * len(k)
+    frequencies = f"{len(k)} frequenc{'ies' if len(k) > 1 else 'y'}"
+    progress(f"{count} angle{'s' * (count > 1)} x {frequencies} by {by}")
     progress.begin(0, values)
 
     def echo_for(dataset: Any) -> Echo:
@@ -69,78 +92,27 @@ def run_echo(job: EchoJob, shape: Any, progress: Progress) -> str:
         mark = f"incomplete: {done} of {values} values; {unfinished.mark}"
         table = output / f"{quantity}.csv"
         write_echo(table, echo_for(found.dataset), known=found.known, mark=mark)
-        missing = {
-            "values_done": done,
-            "values": values,
-            "resume": unfinished.again,
-            "files": [table.name, SUMMARY],
-        }
-        unfinished.write_summary(missing, complete=False)
+        unfinished.write_missing(done, values, table.name)
 
     def passed(done: float, total: int, seconds: float) -> None:
         progress.told(values * done / total, values, seconds)
 
-    with kept(unfinished, progress.message):
-        asked: dict[str, Any] = {"wavenumbers": k, "azimuth": azimuths, "elevation": elevations, "boundary": boundary}
-        asked |= {"cache": given.cache, "progress": passed, "store": unfinished.parts, "resume": True, "rows": rows}
-        if mono:
-            dataset = backscatter(shape, method=method, **asked)
-        else:
-            # one fan for all observers: currents cost no more than rays
-            method = "currents" if method == "auto" else method
-            dataset = bistatic(shape, incidence=request.incidence, method=method, **asked)
-        echo = echo_for(dataset)
-        progress("tables and pictures" if given.pictures else "tables")
-        comparisons, refused = compared(echo, reference, given.align)
-        pictured: dict[str, Any] = {"pictures": given.pictures, "formats": formats}
-        names, extra = write_results(output, echo, comparisons, shape, body, **pictured)
-        summary = summary_of(body, request, echo, dataset) | extra | refused
-        summary["files"] = [*names, SUMMARY]
-        unfinished.write_summary(summary, complete=True)
-    summary |= {"complete": True, "seconds": round(time.perf_counter() - job.started, 2)}
-    return json.dumps(summary, indent=1) if given.json_ else readable(summary, output)
-
-
-def reference_of(
-    request: EchoRequest, path: Path | None, column: str | None, align: float
-) -> dict[str, tuple[MeasuredCut, FloatArray]]:
-    """Measured cut and its levels by channel, of those that it has.
-
-    Raises
-    ------
-    InvalidInputError
-        If the file is no table, lacks the columns, or is over what the request does not vary.
-    """
-    if path is None:
-        return {}
-    if not (np.isfinite(align) and align >= 0):
-        raise InvalidInputError(f"--align {align!r} is not a finite number of degrees >= 0")
-    cut = read_cut(path)
-    if len(request.wavenumbers) > 1 and request.angle_name:
-        raise InvalidInputError("--compare takes a cut or a band; give one frequency, or one direction")
-    over = "frequency" if len(request.wavenumbers) > 1 else "angle"
-    if cut.over != over or (over == "angle" and not request.angle_name):
-        raise InvalidInputError(f"--compare {path} is over {cut.over}; ask for a cut or a band that varies that")
-    if column is None:
-        found = {channel: cut.of(channel) for channel in request.channels}
-        if len(request.channels) > 1 and len(cut.levels) == 1 and all(v is not None for v in found.values()):
-            # a column without a polarisation's name is of one at most
-            found = {}
+    asked: dict[str, Any] = {"wavenumbers": k, "azimuth": angles[0], "elevation": angles[1]}
+    asked |= {"boundary": parse_boundary(request.boundary), "cache": given.cache, "progress": passed}
+    asked |= {"store": unfinished.parts, "resume": True, "rows": rows}
+    if request.monostatic:
+        dataset = backscatter(shape, method=method, **asked)
     else:
-        names = [name.strip() for name in column.split(",")]
-        unknown = [name for name in names if name not in cut.levels]
-        if unknown or len(names) != len(request.channels):
-            raise InvalidInputError(
-                f"--column {column!r}: give one of {', '.join(cut.levels)} for each of {', '.join(request.channels)}"
-            )
-        found = {channel: cut.levels[name] for channel, name in zip(request.channels, names, strict=True)}
-    known = {channel: (cut, levels) for channel, levels in found.items() if levels is not None}
-    if not known:
-        raise InvalidInputError(
-            f"--compare {path} has columns {', '.join(cut.levels)}: say with --column which is "
-            f"{', '.join(request.channels)}"
+        # one fan for all observers: currents cost no more than rays
+        dataset = bistatic(
+            shape, incidence=request.incidence, method="currents" if method == "auto" else method, **asked
         )
-    return known
+    echo = echo_for(dataset)
+    progress("tables and pictures" if given.pictures else "tables")
+    comparisons, refused = compared(echo, job.reference, given.align)
+    pictured: dict[str, Any] = {"pictures": given.pictures, "formats": job.formats}
+    names, extra = write_results(output, echo, comparisons, shape, job.body, **pictured)
+    return summary_of(job.body, request, echo, dataset) | extra | refused | {"files": names}
 
 
 def compared(
@@ -242,10 +214,9 @@ def _drawn(
 
 
 def _title(echo: Echo, name: str) -> str:
-    short = name if len(name) < 50 else f"{name[:47]}..."
     hertz = echo.hertz
     at = f"{hertz[0] / 1e9:g} GHz" if echo.quantity == "rcs" else f"{hertz[0] / 1e3:g} kHz"
-    words = [short, "" if len(hertz) > 1 else at]
+    words = [title_of(name), "" if len(hertz) > 1 else at]
     if echo.incidence is not None:
         words.append(f"bistatic, {echo.viewer} at azimuth {echo.incidence[0]:g}°, elevation {echo.incidence[1]:g}°")
     elif len(echo.azimuth) == 1:
@@ -328,19 +299,12 @@ def readable(summary: dict[str, Any], output: Path) -> str:
     return "\n".join(rows)
 
 
-def run_averages(job: EchoJob, shape: Any, progress: Progress) -> str:
-    """Compute and write means over orientation: what there is to say of them."""
-    request, given, body = job.request, job.given, job.body
-    output, quantity = given.output or Path(request.quantity), request.quantity
-    boundary, k = parse_boundary(request.boundary), request.wavenumbers
+def _averages(job: EchoJob, shape: Any, unfinished: Unfinished, progress: Progress, by: str) -> dict[str, Any]:
+    """Compute and write means over orientation; returns the summary."""
+    request, given, k = job.request, job.given, job.request.wavenumbers
+    output, quantity, boundary = unfinished.output, request.quantity, parse_boundary(request.boundary)
     hertz = np.array([float(f"{one:.14g}") for one in np.atleast_1d(frequency(k, sound_speed=request.sound_speed))])
-    words = job.asked | {"average": True} | job.file.given() | {"pictures": given.pictures}
-    told = forecast(shape, k, boundary, method="t-matrix", metres=True, cure=request.cure)
-    progress.note(f"{told.body}, {boundary_words(boundary)}")
-    unfinished = begun(output, quantity, asked_for(body, shape, **words), resume=given.resume)
-    if unfinished is None:
-        return (output / SUMMARY).read_text() if given.json_ else f"nothing is missing in {output}"
-    progress(f"the mean over all orientations at {len(k)} frequenc{'ies' if len(k) > 1 else 'y'} by {told.by}")
+    progress(f"the mean over all orientations at {len(k)} frequenc{'ies' if len(k) > 1 else 'y'} by {by}")
     progress.begin(0, len(k))
     table, rows = output / f"{quantity}_average.csv", list[tuple[float, Averages]]()
 
@@ -351,38 +315,33 @@ def run_averages(job: EchoJob, shape: Any, progress: Progress) -> str:
 
     def incomplete() -> None:
         write(f"incomplete: {len(rows)} of {len(k)} frequencies; {unfinished.mark}")
-        missing = {"values_done": len(rows), "values": len(k), "resume": unfinished.again}
-        unfinished.write_summary(missing | {"files": [table.name, SUMMARY]}, complete=False)
+        unfinished.write_missing(len(rows), len(k), table.name)
 
-    with kept(unfinished, progress.message):
-        for T in t_matrices(shape, wavenumbers=k, boundary=boundary, store=unfinished.parts):
-            rows.append((T.wavenumber, T.orientation_average()))
-            progress.told(len(rows), len(k))
-            if len(rows) < len(k):
-                unfinished.now_and_then(incomplete)
-        found = write()
-        levels, error = averaged_levels(quantity, found), found.target_strength_error.values
-        names = [table.name]
-        if given.pictures and len(k) > 1:
-            title = f"{body if len(body) < 50 else f'{body[:47]}...'}, mean over all orientations"
-            picture = output / f"{quantity}_average.png"
-            plotting.averages_picture(picture, quantity, hertz, levels, error, title=title)
-            names.append(picture.name)
-        summary = {
-            "body": body,
-            "version": __version__,
-            "quantity": f"{quantity}, mean over orientation",
-            "unit": LEVELS[quantity][1],
-            "boundary": request.boundary,
-            "values": len(k),
-            "frequency_hz": [float(hertz[0]), float(hertz[-1])],
-            "range": [float(levels.min()), float(levels.max())],
-            "error_db": float(error.max()),
-            "files": [*names, SUMMARY],
-        }
-        unfinished.write_summary(summary, complete=True)
-    summary |= {"complete": True, "seconds": round(time.perf_counter() - job.started, 2)}
-    return json.dumps(summary, indent=1) if given.json_ else _readable_averages(summary, output)
+    for T in t_matrices(shape, wavenumbers=k, boundary=boundary, store=unfinished.parts):
+        rows.append((T.wavenumber, T.orientation_average()))
+        progress.told(len(rows), len(k))
+        if len(rows) < len(k):
+            unfinished.now_and_then(incomplete)
+    found = write()
+    levels, error = averaged_levels(quantity, found), found.target_strength_error.values
+    names = [table.name]
+    if given.pictures and len(k) > 1:
+        title = f"{title_of(job.body)}, mean over all orientations"
+        picture = output / f"{quantity}_average.png"
+        plotting.averages_picture(picture, quantity, hertz, levels, error, title=title)
+        names.append(picture.name)
+    return {
+        "body": job.body,
+        "version": __version__,
+        "quantity": f"{quantity}, mean over orientation",
+        "unit": LEVELS[quantity][1],
+        "boundary": request.boundary,
+        "values": len(k),
+        "frequency_hz": [float(hertz[0]), float(hertz[-1])],
+        "range": [float(levels.min()), float(levels.max())],
+        "error_db": float(error.max()),
+        "files": names,
+    }
 
 
 def _readable_averages(summary: dict[str, Any], output: Path) -> str:

@@ -2,21 +2,23 @@
 
 import re
 import sys
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from creeping._typing import FloatArray
-from creeping.commands.body import each_once
 from creeping.commands.forecast import cure_of, size_words
-from creeping.commands.options import EchoOptions, FileOptions
+from creeping.commands.options import EchoOptions, FileOptions, each_once
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import boundary_name, parse_boundary
 from creeping.field.frequency import frequency as frequency_of
 from creeping.field.frequency import is_length, wavenumber
 from creeping.field.results.labelled import POLARISATIONS
+from creeping.files.measured import MeasuredCut, read_cut
 from creeping.geometry.surface import Surface
 
 AXES = {"az": "azimuth", "el": "elevation"}
@@ -153,36 +155,88 @@ def echo_request(
 
 @dataclass(frozen=True)
 class EchoJob:
-    """A request, and what was typed: the body's text, options, what the wave was ``asked`` as; and when it began."""
+    """A request and what was typed: the body's text, options, what the wave was ``asked`` as; and when it began.
+
+    ``reference`` has the measured cut and its levels by channel.
+    """
 
     body: str
     given: EchoOptions
     file: FileOptions
     asked: dict[str, Any]
     request: EchoRequest
+    formats: tuple[str, ...]
+    reference: dict[str, tuple[MeasuredCut, FloatArray]]
     started: float
 
-    def check(self) -> None:
-        """Refuse options that do not go together, and ask about angles that look like radians.
 
-        Raises
-        ------
-        InvalidInputError
-        """
-        given = self.given
-        each_once("--format", given.formats, ("csv",) if given.average else ("csv", "mat"))
-        if given.average:
-            names = ("monostatic", "bistatic", "incidence", "compare", "column", "align")
-            stray = [f"--{name}" for name in names if getattr(given, name)]
-            stray += ["--polarisation"] * bool(self.asked["polarisation"])
-            stray += ["--method"] * (given.method not in ("auto", "t-matrix"))
-            if stray:
-                raise InvalidInputError(f"--average is over all angles and polarisations: leave out {', '.join(stray)}")
-        elif given.compare is None and (stray := [f"--{name}" for name in ("column", "align") if getattr(given, name)]):
-            raise InvalidInputError(f"{' and '.join(stray)}: give --compare as well, what it is about")
-        for name in ("monostatic", "bistatic", "incidence"):
-            if hint := radians_hint(f"--{name}", self.asked[name]):
-                print(f"creeping: {hint}", file=sys.stderr)
+def echo_job(quantity: str, body: str, given: EchoOptions, file: FileOptions, **wave: Any) -> EchoJob:
+    """What a command asks for, if its options go together; asks about angles that look like radians.
+
+    Raises
+    ------
+    InvalidInputError
+        Names the option that is wrong.
+    """
+    started = time.perf_counter()
+    asked: dict[str, Any] = {"frequency": given.frequency, "wavelength": given.wavelength, **wave}
+    asked |= {"monostatic": given.monostatic, "bistatic": given.bistatic, "incidence": given.incidence}
+    request = echo_request(quantity, **asked)
+    formats = each_once("--format", given.formats, ("csv",) if given.average else ("csv", "mat"))
+    if given.average:
+        names = ("monostatic", "bistatic", "incidence", "compare", "column", "align")
+        stray = [f"--{name}" for name in names if getattr(given, name)]
+        stray += ["--polarisation"] * bool(asked["polarisation"])
+        stray += ["--method"] * (given.method not in ("auto", "t-matrix"))
+        if stray:
+            raise InvalidInputError(f"--average is over all angles and polarisations: leave out {', '.join(stray)}")
+    elif given.compare is None and (stray := [f"--{name}" for name in ("column", "align") if getattr(given, name)]):
+        raise InvalidInputError(f"{' and '.join(stray)}: give --compare as well, what it is about")
+    for name in ("monostatic", "bistatic", "incidence"):
+        if hint := radians_hint(f"--{name}", asked[name]):
+            print(f"creeping: {hint}", file=sys.stderr)
+    reference = reference_of(request, given.compare, given.column, given.align) if given.compare else {}
+    return EchoJob(body, given, file, asked, request, formats, reference, started)
+
+
+def reference_of(
+    request: EchoRequest, path: Path, column: str | None, align: float
+) -> dict[str, tuple[MeasuredCut, FloatArray]]:
+    """Measured cut and its levels by channel, of those that it has.
+
+    Raises
+    ------
+    InvalidInputError
+        If the file is no table, lacks the columns, or is over what the request does not vary.
+    """
+    if not (np.isfinite(align) and align >= 0):
+        raise InvalidInputError(f"--align {align!r} is not a finite number of degrees >= 0")
+    cut = read_cut(path)
+    if len(request.wavenumbers) > 1 and request.angle_name:
+        raise InvalidInputError("--compare takes a cut or a band; give one frequency, or one direction")
+    over = "frequency" if len(request.wavenumbers) > 1 else "angle"
+    if cut.over != over or (over == "angle" and not request.angle_name):
+        raise InvalidInputError(f"--compare {path} is over {cut.over}; ask for a cut or a band that varies that")
+    if column is None:
+        found = {channel: cut.of(channel) for channel in request.channels}
+        if len(request.channels) > 1 and len(cut.levels) == 1 and all(v is not None for v in found.values()):
+            # a column without a polarisation's name is of one at most
+            found = {}
+    else:
+        names = [name.strip() for name in column.split(",")]
+        unknown = [name for name in names if name not in cut.levels]
+        if unknown or len(names) != len(request.channels):
+            raise InvalidInputError(
+                f"--column {column!r}: give one of {', '.join(cut.levels)} for each of {', '.join(request.channels)}"
+            )
+        found = {channel: cut.levels[name] for channel, name in zip(request.channels, names, strict=True)}
+    known = {channel: (cut, levels) for channel, levels in found.items() if levels is not None}
+    if not known:
+        raise InvalidInputError(
+            f"--compare {path} has columns {', '.join(cut.levels)}: say with --column which is "
+            f"{', '.join(request.channels)}"
+        )
+    return known
 
 
 def _pair(option: str, text: str, angles: Sequence[float]) -> tuple[float, float]:

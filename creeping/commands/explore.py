@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from cyclopts import Group, Parameter
 
 from creeping.commands import options
-from creeping.commands.body import is_file, parse_body, title_of
+from creeping.commands.options import is_file, parse_body, title_of
 
 _page = Group("Page")
 
@@ -21,14 +21,7 @@ def explore(
     spacing: Annotated[
         float | None, Parameter(help="Of iso-phase curves; an eighth of the length, 0 for none.")
     ] = None,
-    wavenumber: Annotated[float | None, Parameter(group=options.FIELD, help="In 1/L; 40 over the body's size.")] = None,
-    frequency: Annotated[
-        str | None, Parameter(group=options.FIELD, help='Instead, e.g. "10GHz" or "3cm": lengths are metres then.')
-    ] = None,
-    sound_speed: Annotated[
-        float | None,
-        Parameter(group=options.FIELD, help="Of the medium, m/s, if the wave is sound; light if not given."),
-    ] = None,
+    wave: options.WaveOptions = options.NO_WAVE,
     boundary: Annotated[
         str, Parameter(group=options.FIELD, help="soft, hard, pec, or impedance:ETA, e.g. impedance:0.5+0.2j.")
     ] = "hard",
@@ -42,8 +35,12 @@ def explore(
     file: options.FileOptions = options.AS_IT_IS,
     cache: options.Cache = True,
 ) -> int:
-    """Turn the incidence by hand, and watch shadow line, rays, iso-phase curves and field follow."""
+    """Turn the incidence by hand, and watch shadow line, rays, iso-phase curves and field follow.
+
+    k is at first 40 over the body's size if no wave is given.
+    """
     import creeping as cr
+    from creeping.commands.forecast import asked_wavenumber
     from creeping.errors import CreepingError, InvalidInputError
     from creeping.explorer.frames import step_of, steps_of
     from creeping.explorer.request import ViewRequest, angles
@@ -66,14 +63,15 @@ def explore(
     if why_no_rays(shape):
         raise InvalidInputError(rays_refused(shape))
     extent = size(shape)
-    wavenumber, metres = _wave(wavenumber, frequency, sound_speed, body)
     theta, phi = angles(unit_direction(direction))
-    k = _round(40 / extent) if wavenumber is None else wavenumber
+    hertz = wave.frequency or wave.wavelength
+    k = asked_wavenumber(wave)[0] if hertz else _round(40 / extent) if wave.wavenumber is None else wave.wavenumber
+    metres = bool(hertz) or wave.sound_speed is not None or is_file(body)
     far = _round(body_length(shape, k if k > 0 and speed is None else None)) if length is None else length
     gap = _round(far / 8) if spacing is None else spacing
     # the cut runs through the direction of the wave
     cut = float(round(phi))
-    request = ViewRequest(theta, phi, rays, far, gap, k, boundary, cut, metres=metres, sound_speed=sound_speed)
+    request = ViewRequest(theta, phi, rays, far, gap, k, boundary, cut, metres=metres, sound_speed=wave.sound_speed)
     name = title_of(body)
     # a page may be asked for a thousand incidences: what a flow is chosen for
     moves = 1000 if export is None else 1
@@ -91,23 +89,6 @@ def explore(
         print(f"{export}  {megabytes:.1f} MB  {len(found.fan.points)} rays, rms {rms:.1e}")
         return 0
     return _serve(flow, request, port, name, browser, progress)
-
-
-def _wave(
-    wavenumber: float | None, frequency: str | None, sound_speed: float | None, body: str
-) -> tuple[float | None, bool]:
-    """Wavenumber, if one was given, and whether lengths are metres."""
-    from creeping.errors import InvalidInputError
-    from creeping.field.frequency import wavenumber as of_text
-
-    metres = frequency is not None or sound_speed is not None or is_file(body)
-    if frequency is None:
-        return wavenumber, metres
-    if wavenumber is not None:
-        raise InvalidInputError("give --wavenumber or --frequency, not both")
-    if ":" in frequency:
-        raise InvalidInputError(f"--frequency {frequency!r} is a range; the page has one, and a slider")
-    return float(of_text(frequency, sound_speed=sound_speed)), metres
 
 
 def _round(value: float) -> float:

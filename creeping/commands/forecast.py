@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from creeping._typing import ArrayLike, FloatArray
+from creeping.commands.options import WaveOptions
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.arguments import checked, checked_across
 from creeping.field.boundary import BoundaryLike, boundary_name
@@ -16,7 +17,6 @@ from creeping.field.frequency import suited
 from creeping.field.frequency import wavenumber as wavenumber_of
 from creeping.geodesics.equations import points_of_charts
 from creeping.geometry.checks import unit_of
-from creeping.geometry.directions import azimuth_elevation_of
 from creeping.geometry.parts import why_no_rays
 from creeping.geometry.piecewise import has_edges, is_piecewise
 
@@ -176,12 +176,6 @@ def _errors(shape: Any, k: FloatArray) -> str:
     return "errors of up to 40 % of the largest amplitude (3 dB), as parts are more curved than a wavelength allows"
 
 
-def radar_of(direction: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Azimuth and elevation (1,), degrees, of where a wave comes from that travels in a direction."""
-    azimuth, elevation = azimuth_elevation_of(-np.asarray(direction, dtype=float)[None])
-    return np.degrees(azimuth), np.degrees(elevation)
-
-
 def frequency_words(hertz: float) -> str:
     """Frequency with the unit that makes it readable.
 
@@ -194,9 +188,7 @@ def frequency_words(hertz: float) -> str:
     return f"{hertz / scale:.6g} {name}"
 
 
-def asked_wavenumber(
-    wavenumber: float | None, frequency: str | None, wavelength: str | None, sound_speed: float | None
-) -> tuple[float, float | None, str]:
+def asked_wavenumber(wave: WaveOptions) -> tuple[float, float | None, str]:
     """The one wavenumber that is asked for, its frequency, Hz, if it was not given as a wavenumber, and `cure_of` it.
 
     Raises
@@ -204,25 +196,24 @@ def asked_wavenumber(
     InvalidInputError
         If not exactly one is given, or it is no number.
     """
-    given: dict[str, Any] = {"--wavenumber": wavenumber, "--frequency": frequency, "--wavelength": wavelength}
-    given = {name: value for name, value in given.items() if value is not None}
+    given = {f"--{name}": value for name, value in vars(wave).items() if name != "sound_speed" and value is not None}
     if len(given) != 1:
         raise InvalidInputError(f"{' and '.join(given) or 'no wave'} given; give one of --wavenumber, --frequency")
     ((option, value),) = given.items()
-    if wavenumber is not None:
-        if sound_speed is not None:
+    if wave.wavenumber is not None:
+        if wave.sound_speed is not None:
             raise InvalidInputError("--sound-speed goes with --frequency; --wavenumber needs none")
         try:
-            return checked(wavenumber, 2), None, cure_of(option, value, None)
+            return checked(wave.wavenumber, 2), None, cure_of(option, value, None)
         except CreepingError as error:
             raise InvalidInputError(f"--{error}") from error
-    if wavelength is not None and not wavelength.strip().endswith("m"):
-        raise InvalidInputError(f"--wavelength {wavelength!r} has no unit; give e.g. 3cm")
+    if option == "--wavelength" and not value.strip().endswith("m"):
+        raise InvalidInputError(f"--wavelength {value!r} has no unit; give e.g. 3cm")
     try:
-        found = wavenumber_of(value, sound_speed=sound_speed)
+        found = wavenumber_of(value, sound_speed=wave.sound_speed)
         if not isinstance(found, float):
             raise InvalidInputError(f"{value!r} is a range; `creeping rcs`, `ts` and `coupling` take those")
-        hertz = float(hertz_of(found, sound_speed=sound_speed))
+        hertz = float(hertz_of(found, sound_speed=wave.sound_speed))
         return checked(found, 2), hertz, cure_of(option, value, hertz)
     except InvalidInputError as error:
         raise InvalidInputError(f"{option}: {error}") from error

@@ -17,12 +17,11 @@ from creeping._progress import Progress
 from creeping._version import __version__
 from creeping.commands import antennas as _antennas
 from creeping.commands import check as _checking
-from creeping.commands import echo as _echo_command
 from creeping.commands import explore as _explore_command
 from creeping.commands import options, resuming
 from creeping.commands import sweep as _sweep_command
 from creeping.commands import upkeep as _upkeep
-from creeping.commands.body import Output, each_once, flow_of, parse_body, title_of
+from creeping.commands.options import Output, each_once, flow_of, parse_body, title_of
 
 app = App(
     name="creeping",
@@ -80,10 +79,12 @@ def _as_options(text: str) -> str:
     from dataclasses import fields
     from inspect import signature
 
-    names = {field.name for kind in (options.FileOptions, options.EchoOptions) for field in fields(kind)}
-    names.update(*(signature(command).parameters for command in (run, _echo_command.ts)))
+    names = {
+        field.name for kind in (options.FileOptions, options.WaveOptions, options.EchoOptions) for field in fields(kind)
+    }
+    names.update(*(signature(command).parameters for command in (run, ts)))
     # k is in messages whichever of three options gave it
-    words = "|".join(sorted(names - {"wavenumber", "body", "file"}, key=len, reverse=True))
+    words = "|".join(sorted(names - {"wavenumber", "body", "file", "wave"}, key=len, reverse=True))
     pattern = rf"(?<![\w.-])({words})(?:=| = )(?:'([^']*)'|\"([^\"]*)\"|True\b)?"
 
     def option(found: re.Match[str]) -> str:
@@ -125,12 +126,7 @@ def run(
     ] = "auto",
     speed: options.SpeedOption = None,
     file: options.FileOptions = options.AS_IT_IS,
-    wavenumber: Annotated[
-        float | None, Parameter(group=options.FIELD, help="k, 1/L: adds the field to the results.")
-    ] = None,
-    frequency: options.Frequency = None,
-    wavelength: options.Wavelength = None,
-    sound_speed: options.SoundSpeed = None,
+    wave: options.WaveOptions = options.NO_WAVE,
     boundary: Annotated[
         str | None,
         Parameter(group=options.FIELD, help="soft (if not given), hard, pec or impedance:ETA, e.g. 0.5+0.2j."),
@@ -170,10 +166,14 @@ def run(
     resume: options.Resume = False,
 ) -> int:
     """Shadow line, creeping rays, iso-phase curves, pictures and files for one incidence."""
-    words = {name: value for name, value in locals().items() if name not in ("body", "file", "output", "json_")}
-    words |= file.given()
+    words = {name: value for name, value in locals().items() if name not in ("body", "file", "wave", "output", "json_")}
+    words |= vars(wave) | file.given()
     del words["resume"]
-    _upkeep.compile_ahead()
+    # the kernels of rays are compiled while libraries are loaded
+    import creeping.kernels.block
+    from creeping.kernels import first_use
+
+    first_use.begin("creeping.shadow")
     import numpy as np
 
     import creeping as cr
@@ -190,15 +190,13 @@ def run(
     for name, value in (("length", length), ("spacing", spacing)):
         if isinstance(value, float) and not (np.isfinite(value) and value > 0):
             raise cr.CreepingError(f"--{name} {value!r} is not a positive finite number")
-    wave: dict[str, Any] = {"frequency": frequency, "wavelength": wavelength, "sound_speed": sound_speed}
-    wave |= {"polarisation": polarisation, "weighted": speed is not None}
     of = of or ("travel_time" if source is None else "eikonal")
     if source is None and direction is None:
         raise cr.InvalidInputError(
             "give --direction X Y Z, where a plane wave travels, or --source X Y Z, a point source"
         )
     incident: Any = PlaneWave(direction or ()) if source is None else PointSource(source)
-    job = _field_run.job(wavenumber, boundary, observe, direction, **wave)
+    job = _field_run.job(wave, boundary, observe, direction, weighted=speed is not None, polarisation=polarisation)
     with Progress(quiet=json_) as progress:
         shape = parse_body(body, speed, options=file, cache=cache, progress=progress)
         planes = [_run_results.parse_plane(text) for text in plane or ()]
@@ -260,6 +258,53 @@ def run(
             summary["seconds"] = round(time.perf_counter() - started, 2)
             unfinished.write_summary(summary, complete=True)
     print(json.dumps(summary, indent=1) if json_ else _run_results.readable(summary, output))
+    return 0
+
+
+@app.command
+def rcs(
+    body: options.Body,
+    *,
+    polarisation: Annotated[
+        str | None, Parameter(help="HH, VV, HV, VH, joined by commas: received, then transmitted. HH,VV.")
+    ] = None,
+    echo: options.EchoOptions = options.AS_USUAL,
+    file: options.FileOptions = options.AS_IT_IS,
+) -> int:
+    """Radar cross section of a perfect conductor in dBsm: over angle, frequency or both, or in the mean."""
+    return _run_echo("rcs", body, echo, file, sound_speed=None, polarisation=polarisation, boundary="pec")
+
+
+@app.command
+def ts(
+    body: options.Body,
+    *,
+    sound_speed: Annotated[float, Parameter(help="Of the medium, m/s, e.g. 1477 of sea water.")],
+    boundary: Annotated[str, Parameter(help="soft (pressure release), hard (rigid) or impedance:ETA.")] = "soft",
+    echo: options.EchoOptions = options.AS_USUAL,
+    file: options.FileOptions = options.AS_IT_IS,
+) -> int:
+    """Target strength of a body in dB re 1 m: over angle, frequency or both, or in the mean."""
+    from creeping.errors import InvalidInputError
+
+    if boundary == "pec":
+        raise InvalidInputError("--boundary pec is of radar: creeping rcs")
+    return _run_echo("ts", body, echo, file, sound_speed=sound_speed, polarisation=None, boundary=boundary)
+
+
+def _run_echo(quantity: str, body: str, echo: options.EchoOptions, file: options.FileOptions, **wave: Any) -> int:
+    """Refuse what makes no sense before the body is read, and its size before libraries of fields are loaded."""
+    from creeping.commands.echo_request import echo_job
+    from creeping.commands.forecast import size_words
+
+    job = echo_job(quantity, body, echo, file, **wave)
+    with Progress("frequencies" if echo.average else "", quiet=echo.json_) as progress:
+        shape = parse_body(body, options=file, cache=echo.cache, progress=progress)
+        size_words(shape, job.request.wavenumbers, metres=True, cure=job.request.cure)
+        from creeping.commands.echo_report import run_echo
+
+        told = run_echo(job, shape, progress)
+    print(told)
     return 0
 
 
@@ -339,8 +384,6 @@ def figure(
     return 0
 
 
-app.command(_echo_command.rcs)
-app.command(_echo_command.ts)
 app.command(_checking.check)
 app.command(_sweep_command.sweep)
 app.command(_explore_command.explore)

@@ -84,6 +84,11 @@ class Unfinished:
             write()
             self._shown = time.monotonic()
 
+    def write_missing(self, done: int, count: int, file: str) -> None:
+        """Write the summary of a file that lacks rows."""
+        missing = {"values_done": done, "values": count, "resume": self.again, "files": [file, SUMMARY]}
+        self.write_summary(missing, complete=False)
+
     def write_summary(self, summary: dict[str, Any], *, complete: bool) -> None:
         """Write the summary file, without the seconds, which are those of one run; the parts go when all is written."""
         from creeping.files import write_text
@@ -146,7 +151,7 @@ def begun(output: Path, name: str, asked: dict[str, Any], *, resume: bool) -> Un
 
 
 def _read(path: Path) -> dict[str, Any] | None:
-    from creeping.storage.reading import bytes_of
+    from creeping.storage.atomic import bytes_of
 
     with suppress(OSError, ValueError, RecursionError):
         content = json.loads(bytes_of(path, 10_000_000))

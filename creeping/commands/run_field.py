@@ -1,6 +1,7 @@
 """The field of one ``creeping run``: what its options ask for, and the files that come of it. Angles in degrees."""
 
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -9,8 +10,8 @@ import numpy as np
 
 from creeping import files, plotting
 from creeping._typing import ArrayLike, FloatArray
-from creeping.commands.body import Output, each_once, write_tables
-from creeping.commands.forecast import Forecast, asked_wavenumber, forecast, frequency_words, radar_of
+from creeping.commands.forecast import Forecast, asked_wavenumber, forecast, frequency_words
+from creeping.commands.options import Output, WaveOptions, each_once, write_tables
 from creeping.commands.resuming import Unfinished
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.body_currents import cached_currents
@@ -24,7 +25,7 @@ from creeping.field.results.labelled import POLARISATIONS
 from creeping.field.validity_range import validity
 from creeping.field.waves.forward import lobe_step
 from creeping.files.ffe import grid_directions
-from creeping.geometry.directions import unit_direction, unit_directions
+from creeping.geometry.directions import azimuth_elevation_of, unit_direction, unit_directions
 from creeping.geometry.incident import REMEDY, PlaneWave, incident_words
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface
@@ -96,11 +97,12 @@ class Job:
 
     def forecast(self, body: Surface, incident: Any) -> Forecast:
         """What the field is made by, and how well."""
+        azimuth, elevation = azimuth_elevation_of(-np.asarray(incident.direction, dtype=float)[None])
         return forecast(
             body,
             self.wavenumber,
             self.boundary,
-            radar=radar_of(incident.direction),
+            radar=(np.degrees(azimuth), np.degrees(elevation)),
             observers=len(self.directions),
             metres=self.unit == "m",
             cure=self.cure,
@@ -187,7 +189,6 @@ class Job:
         names = self._tables(far, direction, output)
         if output.pictures:
             names += self._pictures(far, of, output)
-        methods, counts = np.unique(far.method, return_counts=True)
         size = np.abs(far.total)
         finite = np.isfinite(size)
         largest, off = float(np.max(size[finite], initial=0.0)), far.stated_error
@@ -203,7 +204,7 @@ class Job:
             "largest": largest,
             "largest_db": top if np.isfinite(top) else None,
             "not_finite": int(np.sum(~finite)),
-            "methods": {str(name): int(count) for name, count in zip(methods, counts, strict=True)},
+            "methods": dict(sorted(Counter(far.method.tolist()).items())),
             "unresolved": int(far.unresolved.sum()),
             "error": {"rms": None, "max": None, "by": None}
             if off is None
@@ -287,15 +288,12 @@ class Job:
 
 
 def job(
-    wavenumber: float | None,
+    wave: WaveOptions,
     boundary: str | None,
     observe: Sequence[str] | None,
     direction: Sequence[float] | None,
     *,
     weighted: bool = False,
-    frequency: str | None = None,
-    wavelength: str | None = None,
-    sound_speed: float | None = None,
     polarisation: str | None = None,
 ) -> Job | None:
     """What the options ask for, None without a wavenumber, a frequency or a wavelength.
@@ -307,10 +305,9 @@ def job(
     InvalidInputError
         On a bad option, or one that needs ``--wavenumber``.
     """
-    given = [wavenumber, frequency, wavelength]
-    if all(value is None for value in given):
-        options = (("--boundary", boundary), ("--observe", observe), ("--polarisation", polarisation))
-        stray = [name for name, value in (*options, ("--sound-speed", sound_speed)) if value]
+    if wave == WaveOptions(sound_speed=wave.sound_speed):
+        options = {"--boundary": boundary, "--observe": observe, "--polarisation": polarisation}
+        stray = [name for name, value in (options | {"--sound-speed": wave.sound_speed}).items() if value]
         if stray:
             verb = "needs" if len(stray) == 1 else "need"
             raise InvalidInputError(
@@ -321,7 +318,7 @@ def job(
         raise InvalidInputError("--wavenumber is for rays of constant speed; leave out --speed, or the field")
     if direction is None:
         raise InvalidInputError(f"the field of --wavenumber is that of a plane wave; --source is {REMEDY}")
-    k, hertz, cure = asked_wavenumber(wavenumber, frequency, wavelength, sound_speed)
+    k, hertz, cure = asked_wavenumber(wave)
     d = unit_direction(direction)
     # the cut through the direction of the wave; of one along z that of phi = 0
     azimuth = 0.0 if np.hypot(d[0], d[1]) < 1e-9 else np.degrees(np.arctan2(d[1], d[0]))
@@ -329,7 +326,7 @@ def job(
     if sum(target.kind == "grid" for target in targets) > 1:
         raise InvalidInputError("--observe names several grids; give one, far.ffe holds no more")
     kind = _boundary(boundary or "soft")
-    unit = "m" if wavenumber is None else None
+    unit = "m" if wave.wavenumber is None else None
     if polarisation is not None and kind != "pec":
         raise InvalidInputError("--polarisation is of a conductor; give it with --boundary pec")
     shown = each_once("--polarisation", polarisation or "VV,HH", POLARISATIONS)

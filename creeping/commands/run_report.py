@@ -1,6 +1,7 @@
 """What one ``creeping run`` says and writes, of rays, of bodies without them and on planes."""
 
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -11,8 +12,8 @@ import numpy as np
 from creeping import files, plotting
 from creeping._progress import Progress
 from creeping._version import __version__
-from creeping.commands.body import Output, write_tables
 from creeping.commands.forecast import boundary_words, frequency_words
+from creeping.commands.options import Output, write_tables
 from creeping.commands.resuming import Unfinished, kept
 from creeping.commands.run_field import DPI, Job
 from creeping.errors import InvalidInputError
@@ -75,10 +76,16 @@ def write_planes(
     entries, names = [], []
     for number, plane in enumerate(planes, 1):
         stem = "plane" if number == 1 else f"plane_{number}"
-        grid = cut_grid(source, **_options(plane, job, source))
+        asked: dict[str, Any] = {"step": plane.step} | (job.wave if isinstance(source, RayFan) else {})
+        if plane.axes is not None:
+            asked |= {"across": plane.axes[0], "up": plane.axes[1]}
+        grid = cut_grid(source, **asked)
         progress(f"field on the plane {plane.text}: {len(grid.points)} points")
         started = time.perf_counter()
-        cut = field_cut(source, **_options(plane, job, source), **_polarisation(job))
+        if job.boundary == "pec":
+            # the transmitted one of the first component that pictures show
+            asked["polarisation"] = {"t": "theta", "p": "phi"}[job.components[0][1]]
+        cut = field_cut(source, **asked)
         seconds = time.perf_counter() - started
         if job.unit:
             cut = replace(cut, field=replace(cut.field, length_unit=job.unit))
@@ -91,20 +98,8 @@ def write_planes(
     return entries, names
 
 
-def _options(plane: Plane, job: Job, source: RayFan | Solution) -> dict[str, Any]:
-    """Arguments of `field_cut`, and of `cut_grid`."""
-    axes = {} if plane.axes is None else {"across": plane.axes[0], "up": plane.axes[1]}
-    return (job.wave if isinstance(source, RayFan) else {}) | axes | {"step": plane.step}
-
-
-def _polarisation(job: Job) -> dict[str, Any]:
-    """Of a conductor the transmitted one of the first component that pictures show."""
-    return {"polarisation": {"t": "theta", "p": "phi"}[job.components[0][1]]} if job.boundary == "pec" else {}
-
-
 def _plane_entry(plane: Plane, cut: FieldCut) -> dict[str, Any]:
     field = cut.field
-    methods, counts = np.unique(field.method, return_counts=True)
     off = field.error[field.ok]
     return {
         "plane": plane.text,
@@ -112,7 +107,7 @@ def _plane_entry(plane: Plane, cut: FieldCut) -> dict[str, Any]:
         "step": cut.step,
         "inside": int(np.sum(~cut.outside)),
         "status": field.status_counts,
-        "methods": {str(name): int(count) for name, count in zip(methods, counts, strict=True)},
+        "methods": dict(sorted(Counter(field.method.tolist()).items())),
         "error_median": float(np.median(off)) if off.size else None,
         "error_max": float(off.max()) if off.size else None,
     }

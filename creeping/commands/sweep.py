@@ -13,7 +13,7 @@ from cyclopts import Group, Parameter
 
 from creeping._progress import Progress
 from creeping.commands import options
-from creeping.commands.body import flow_of, is_file, parse_body
+from creeping.commands.options import flow_of, is_file, parse_body
 
 _workers = Group("Workers")
 

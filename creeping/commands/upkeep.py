@@ -182,14 +182,6 @@ def doctor() -> int:
     return 3 if any(there[name] is None for name in LIBRARIES) else 0
 
 
-def compile_ahead() -> None:
-    """Have the kernels of rays compiled while the libraries of a command are loaded."""
-    import creeping.kernels.block  # noqa: F401
-    from creeping.kernels import first_use
-
-    first_use.begin("creeping.shadow")
-
-
 def main(first: str, folder: str, digest: str) -> None:
     """Compile what a process needs that began with a kernel of the module ``first``; end when standard input does.
 

@@ -4,6 +4,11 @@ While it moves: rays coloured by their field, iso-phase curves, the outline n.d 
 (m, 2, 3) in single precision, without NaN, as a graphics card takes them. When it rests: the line to rounding, a fan
 with its error, the field on the body and afar; each step asks before it starts whether the request still stands, so
 that a newer one does not wait for long.
+
+The wave along rays: between two steps the eikonal is linear, as it is along any ray, and the rest of the wave, which is
+slow to vary, is taken as linear; the quarter of a turn of a caustic is spread over the step that passes it.
+
+Sources: Derivations, F3.
 """
 
 from collections.abc import Callable
@@ -15,7 +20,6 @@ import numpy as np
 from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.explorer.request import ViewRequest
-from creeping.explorer.wave import RayWave, ray_wave, segments
 from creeping.field.body_currents import cached_currents
 from creeping.field.far import far_field
 from creeping.field.on_rays import ray_envelope
@@ -30,8 +34,7 @@ from creeping.geometry.directions import directions_from_angles
 from creeping.geometry.evaluators import speed_of
 from creeping.geometry.surface import Surface
 from creeping.geometry.triangulation import Triangulation
-from creeping.plotting.coloured_body import current_levels
-from creeping.plotting.field_pictures import levels_of, surface_values
+from creeping.plotting.coloured_body import LEAST_SAMPLES, current_levels, levels_of, surface_values
 from creeping.rays.fan import RayFan, end_error, launch
 from creeping.rays.isophase import IsoPhaseCurve, iso_phase_curves
 from creeping.rays.transport import Flow
@@ -42,6 +45,60 @@ MOST_STEPS = 192
 """Of a ray."""
 NOTHING: FloatArray = np.zeros((0, 2, 3), dtype=np.float32)
 """No segments, in the precision of the page."""
+
+
+@dataclass(frozen=True, eq=False)
+class RayWave:
+    """The field along rays, fine enough to show its phase.
+
+    Attributes
+    ----------
+    segments : (rays (points - 1), 2, 3) of float32
+    values : (rays, points) complex
+        Of modulus 1: e^{i arg u}.
+    levels : (rays, points), dB
+        -inf where a ray has ended.
+    """
+
+    segments: FloatArray
+    values: ComplexArray
+    levels: FloatArray
+
+
+def ray_wave(fan: RayFan, envelope: ComplexArray, levels: FloatArray, wavenumber: float) -> RayWave | None:
+    """The wave of rays from its envelope and levels at their steps (rays, steps); None if too short to be drawn."""
+    rays, steps = levels.shape
+    if not rays:
+        return None
+    waves = wavenumber * float(fan.travel_time[1] - fan.travel_time[0]) / (2 * np.pi)
+    # six points a wavelength, unless rays have too many segments
+    parts = max(1, min(int(np.ceil(6.0 * waves)), 60_000 // (rays * (steps - 1))))
+    if parts < LEAST_SAMPLES * waves:
+        return None
+    slow = np.unwrap(np.angle(np.where(np.isfinite(envelope), envelope, 1.0)), axis=1)
+    ended = _between(np.isneginf(levels).astype(float), parts) > 0
+    fine = _between(np.clip(levels, -1e3, 1e3), parts)
+    return RayWave(
+        segments(_between(fan.points, parts)),
+        np.exp(1j * _between(wavenumber * fan.eikonal + slow, parts)),
+        np.where(ended, -np.inf, fine),
+    )
+
+
+def segments(points: FloatArray, *, closed: bool = False) -> FloatArray:
+    """Segments of lines (n, m, 3): (k, 2, 3) of float32."""
+    if closed:
+        points = np.concatenate([points, points[:, :1]], axis=1)
+    pairs = np.stack([points[:, :-1], points[:, 1:]], axis=2)
+    return np.ascontiguousarray(pairs.reshape(-1, 2, 3), dtype=np.float32)
+
+
+def _between(values: FloatArray, parts: int) -> FloatArray:
+    """Values (rays, steps, ...) with each step cut into equal parts, linear: (rays, (steps - 1) parts + 1, ...)."""
+    share = (np.arange(parts) / parts).reshape(-1, *[1] * (values.ndim - 2))
+    first, last = values[:, :-1, None], values[:, 1:, None]
+    cut = (first + share * (last - first)).reshape(len(values), -1, *values.shape[2:])
+    return np.concatenate([cut, values[:, -1:]], axis=1)
 
 
 @dataclass(frozen=True, eq=False)

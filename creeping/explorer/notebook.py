@@ -11,8 +11,7 @@ from creeping.explorer.door import with_title
 from creeping.explorer.frames import Refined, preview_of, refined_view, step_of
 from creeping.explorer.panel import cut_svg, legend, plane_svg, refined_text, validity_text
 from creeping.explorer.request import RAYS, ViewRequest, angles
-from creeping.explorer.scene import DrawnBody, Scene
-from creeping.explorer.wave import fitted_span
+from creeping.explorer.scene import DrawnBody, Scene, fitted_span
 from creeping.field.boundary import BoundaryLike, boundary_name
 from creeping.files import write_text
 from creeping.rays.fan import RayFan

@@ -43,8 +43,7 @@ from creeping.explorer.frames import (
 )
 from creeping.explorer.panel import cut_svg, legend, plane_svg, preview_plane_svg, preview_text, refined_text, wave_note
 from creeping.explorer.request import BOUNDARIES, RAYS, ViewRequest, angles, wave_scale
-from creeping.explorer.scene import DrawnBody, Paint, Scene, turned
-from creeping.explorer.wave import Span, fitted_span
+from creeping.explorer.scene import DrawnBody, Paint, Scene, Span, fitted_span, turned
 from creeping.field.lit_ground import convex
 from creeping.field.routes import expected_nodes
 from creeping.geometry.evaluators import speed_of

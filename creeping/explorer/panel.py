@@ -14,7 +14,7 @@ from creeping._typing import ComplexArray, FloatArray
 from creeping._version import __version__
 from creeping.explorer.frames import Preview, Refined, requested_curves
 from creeping.explorer.request import ViewRequest, far_levels, far_name, wave_text
-from creeping.explorer.wave import ENDED, FIELD_COLOURS, LEVEL_COLOURS, WAVE_COLOURS, ColourTable, Span
+from creeping.explorer.scene import ENDED, FIELD_COLOURS, LEVEL_COLOURS, WAVE_COLOURS, Bytes, Span, coloured
 from creeping.field.results.comparison import shown_range
 from creeping.field.results.far_result import FarField
 from creeping.field.tmatrix.result import METHOD
@@ -25,7 +25,7 @@ from creeping.plotting.far_cuts import component_name
 from creeping.plotting.line_plots import is_torus
 from creeping.plotting.pages import COLOURS, EXACT
 from creeping.rays.fan import RayFan
-from creeping.rays.isophase import split_at_seam
+from creeping.rays.isophase import IsoPhaseCurve
 
 _TEXT = 'font-size="11" font-family="sans-serif" fill="#333"'
 WIDTH, LEFT, RIGHT, TOP, BOTTOM = 360.0, 40.0, 13.0, 8.0, 34.0
@@ -86,42 +86,39 @@ class _Axes:
 
 
 def plane_svg(found: Refined) -> str:
-    """Shadow line, rays and iso-phase curves over (phi, theta), degrees."""
-    body, fan = found.fan.body, found.fan
-    rays = _flat(body.parameters(fan.points[k]) for k in _some(fan, 48))
-    curves = [
-        (curve.level / fan.length, [np.degrees(piece[:, ::-1]) for piece in curve.parameter_pieces])
-        for curve in requested_curves(found.request, fan)
-    ]
-    line = {status: _flat(map(body.parameters, line_pieces(found.line, status))) for status in STATUS_COLOURS}
-    return _plane(is_torus(found.line), rays, curves, line)
+    """Shadow line, rays and iso-phase curves over (phi, theta), degrees, with gaps of a step at the seam."""
+    lines = {status: line_pieces(found.line, status) for status in STATUS_COLOURS}
+    return _plane(found.fan, requested_curves(found.request, found.fan), lines, rays=48)
 
 
 def preview_plane_svg(frame: Preview) -> str:
-    """The same while the hand moves: fewer rays and points, of the line what is attached, gaps at the seam."""
-    body, fan = frame.fan.body, frame.fan
-    chosen = _some(fan, 24)
-    rays = _broken(body.parameters(fan.points[chosen, ::2])) if len(chosen) else []
-    curves = []
-    for curve in frame.curves:
-        points = curve.parameters[:: 1 + len(curve.parameters) // 100]
+    """The same while the hand moves: fewer rays and points, of the line what is attached."""
+    return _plane(frame.fan, frame.curves, {"attached": frame.launch_arcs}, rays=24, most=100)
+
+
+def _plane(
+    fan: RayFan,
+    curves: Sequence[IsoPhaseCurve],
+    lines: dict[str, list[FloatArray]],
+    *,
+    rays: int,
+    most: int | None = None,
+) -> str:
+    """So many rays, curves of ``most`` points, and lines by status (n, 3) over the parameters."""
+    body, torus = fan.body, is_torus(fan.line)
+    axes = _Axes((-180, 180), (-180, 180) if torus else (180, 0), WIDTH if torus else 0.56 * WIDTH)
+    chosen = _some(fan, rays)
+    drawn = _broken(body.parameters(fan.points[chosen, :: 2 if most else 1])) if chosen else []
+    parts = [axes.lines(drawn, RAY_COLOUR, 0.5, 0.6)]
+    for curve in curves:
+        points = curve.parameters[:: 1 + len(curve.parameters) // (most or len(curve.parameters) + 1)]
         if curve.closed:
             points = np.concatenate([points, points[:1]])
-        curves.append((curve.level / fan.length, _broken(points[None])))
-    line = [piece for arc in frame.launch_arcs for piece in _broken(body.parameters(arc)[None])]
-    return _plane(is_torus(fan.line), rays, curves, {"attached": line})
-
-
-Pieces = list[FloatArray]
-
-
-def _plane(torus: bool, rays: Pieces, curves: list[tuple[float, Pieces]], lines: dict[str, Pieces]) -> str:
-    """Pieces (k, 2) of rays, of curves by the share of their level, and of lines by status: phi and theta, degrees."""
-    axes = _Axes((-180, 180), (-180, 180) if torus else (180, 0), WIDTH if torus else 0.56 * WIDTH)
-    parts = [axes.lines(rays, RAY_COLOUR, 0.5, 0.6)]
-    parts += [axes.lines(pieces, LEVEL_COLOURS.hexadecimal(share), 0.9) for share, pieces in curves]
+        parts.append(axes.lines(_broken(points[None]), _hex(LEVEL_COLOURS, curve.level / fan.length), 0.9))
     dashes = {"attached": "", "occluded": "6,2", "concave": "2,2"}
-    parts += [axes.lines(p, STATUS_COLOURS[s], 1.8, dashes=dashes[s]) for s, p in lines.items()]
+    for status, arcs in lines.items():
+        pieces = [piece for arc in arcs for piece in _broken(body.parameters(arc)[None])]
+        parts.append(axes.lines(pieces, STATUS_COLOURS[status], 1.8, dashes=dashes[status]))
     return _picture("plane", axes.height, [*parts, _plane_frame(torus)])
 
 
@@ -193,11 +190,6 @@ def _broken(parameters: FloatArray) -> list[FloatArray]:
         ends = [0, *(np.flatnonzero(jumps[k]) + 1).tolist(), flat.shape[1]]
         pieces += [flat[k, a:b] for a, b in pairwise(ends) if b - a > 1]
     return [piece for piece in pieces if np.isfinite(piece[0, 0])]
-
-
-def _flat(curves: Iterable[FloatArray]) -> list[FloatArray]:
-    """Pieces (phi, theta) in degrees of curves of parameters, cut at the seam."""
-    return [np.degrees(p[:, ::-1]) for curve in curves for p in split_at_seam(curve, closed=False)]
 
 
 def _picture(name: str, height: float, parts: Iterable[str]) -> str:
@@ -278,7 +270,7 @@ def legend(frame: Preview, span: Span, *, still: bool = False, wave: bool = Fals
     if frame.request.spacing:
         rows.append(_bar("levels", LEVEL_COLOURS, ("0", "iso-phase curves: travel time", f"{frame.fan.length:.3g}")))
     line = dict(zip(("shadow line", "occluded", "concave"), STATUS_COLOURS.values(), strict=True))
-    rows.append(_keys(line | {"outline": RAY_COLOUR, "no ray": "#{:02x}{:02x}{:02x}".format(*ENDED)}))
+    rows.append(_keys(line | {"outline": RAY_COLOUR, "no ray": f"#{bytes(ENDED).hex()}"}))
     if not still:
         # handles, in the colours that they have on the page
         rows.append(_keys({"arc: tilts d": "#ff2060", "tilts d": "#20df80", "turns d about itself": "#2080ff"}))
@@ -287,15 +279,20 @@ def legend(frame: Preview, span: Span, *, still: bool = False, wave: bool = Fals
     return f'<svg id="bar" xmlns="http://www.w3.org/2000/svg" {box}>{placed}</svg>'
 
 
-def _bar(name: str, colours: ColourTable, words: tuple[str, str, str]) -> str:
+def _bar(name: str, colours: Bytes, words: tuple[str, str, str]) -> str:
     """A bar of colours with words below its lower end, middle and upper end."""
     stops = "".join(
-        f'<stop offset="{share:.2f}" stop-color="{colours.hexadecimal(share)}"/>' for share in np.linspace(0, 1, 9)
+        f'<stop offset="{share:.2f}" stop-color="{_hex(colours, share)}"/>' for share in np.linspace(0, 1, 9)
     )
     ends = zip(words, (8, 180, 352), ("start", "middle", "end"), strict=True)
     text = "".join(f'<text x="{x}" y="20" text-anchor="{anchor}" {_TEXT}>{word}</text>' for word, x, anchor in ends)
     fill = f'<defs><linearGradient id="{name}">{stops}</linearGradient></defs>'
     return f'{fill}<rect x="8" y="2" width="344" height="8" fill="url(#{name})"/>{text}'
+
+
+def _hex(table: Bytes, share: float) -> str:
+    """One colour as text."""
+    return f"#{coloured(table, np.array(share)).tobytes().hex()}"
 
 
 def _keys(colours: dict[str, str]) -> str:

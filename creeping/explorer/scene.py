@@ -2,36 +2,100 @@
 
 The body stays and lines move: only their positions and colours are sent. Numbers go to the page in single precision;
 none of them is NaN. The drawn body is a little smaller than the true one, so that lines on it are not cut by triangles.
+
+Colours of the wave move with its phase:
+
+    colour = h Re(u e^{-i omega t})/|u|,   h = (20 log10 |u| - low)/(high - low), within 0..1
+
+so that waves are seen through the whole range of the colours, deep in the shadow too.
+
+Sources: Derivations, F3.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from matplotlib import colormaps
+from numpy.typing import NDArray
 
 from creeping._typing import Any, ComplexArray, FloatArray
-from creeping.explorer.frames import NOTHING, Preview, Refined, joined, outline
-from creeping.explorer.wave import (
-    ENDED,
-    LEVEL_COLOURS,
-    LINEAR,
-    Bytes,
-    Span,
-    field_colours,
-    segments,
-    strengths,
-    wave_colours,
-)
+from creeping.explorer.frames import NOTHING, Preview, Refined, joined, outline, segments
 from creeping.field.on_rays import creeps
+from creeping.field.results.comparison import shown_range
 from creeping.geometry.piecewise import drawn_mesh
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.triangulation import Triangulation
 from creeping.plotting._drawing import shadow_view
 from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, RAY_COLOUR, STATUS_COLOURS, line_pieces
-from creeping.plotting.coloured_body import LEAST_SAMPLES, samples_a_wave
+from creeping.plotting.coloured_body import LEAST_SAMPLES, at_phase, samples_a_wave
 
 CELLS = 44
 """Of the drawn body along each side of its box."""
+
+
+Bytes = NDArray[np.uint8]
+Span = tuple[float, float]
+ENDED = (150, 156, 162)
+"""Colour where a ray has ended or no ray passes."""
+_SHARE = np.arange(256) / 255
+LINEAR: Bytes = np.round(255 * np.where(_SHARE <= 0.04045, _SHARE / 12.92, ((_SHARE + 0.055) / 1.055) ** 2.4)).astype(
+    np.uint8
+)
+"""Bytes of colours as the page takes them at vertices, where it has light and no sRGB."""
+FIELD_COLOURS, WAVE_COLOURS, LEVEL_COLOURS = (
+    np.asarray(colormaps[name](np.linspace(0.0, high, 256), bytes=True)[:, :3], dtype=np.uint8)
+    for name, high in (("magma", 1.0), ("RdBu_r", 1.0), ("viridis", 0.9))
+)
+"""Tables of colours as bytes (256, 3), made once: a frame has ten thousand of them."""
+
+
+def coloured(table: Bytes, share: FloatArray) -> Bytes:
+    """Colours of numbers in 0..1, clipped to it: (...) -> (..., 3)."""
+    return table[np.clip(255 * np.asarray(share), 0, 255).astype(np.intp)]
+
+
+def strengths(values: ComplexArray, levels: FloatArray, span: Span) -> ComplexArray:
+    """h u/|u| of fields (...) and their levels, dB: NaN where there is none, of modulus 1 at most."""
+    low, high = span
+    share = np.clip((np.nan_to_num(levels, nan=low, posinf=high, neginf=low) - low) / (high - low), 0.0, 1.0)
+    size = np.abs(values)
+    known = np.isfinite(size) & (size > 0)
+    unit = np.where(known, values, 1.0) / np.where(known, size, 1.0)
+    return np.where(levels > -np.inf, share * unit, np.nan)
+
+
+def wave_colours(strength: ComplexArray, phase: float) -> Bytes:
+    """Colours of `strengths` (...) when omega t = phase, radians: (..., 3); ENDED where there is no field."""
+    height = at_phase(strength, phase)
+    out = coloured(WAVE_COLOURS, 0.5 + 0.5 * np.nan_to_num(height))
+    out[np.isnan(height)] = ENDED
+    return out
+
+
+def fitted_span(levels: FloatArray | None, before: Span | None = None) -> Span:
+    """Range of colours, 10 to 60 dB, that fits decibels (...) of the incident wave; the one before while that fits too.
+
+    Neither the few points beside a caustic nor those in the deepest shadow stretch it.
+    """
+    finite = np.zeros(0) if levels is None else levels[np.isfinite(levels)]
+    if not len(finite):
+        return before or (-50.0, 5.0)
+    least, most = np.percentile(finite, [1.0, 99.0])
+    # by so much data may leave their range or fall short of it: it does not flicker
+    if before and abs(most - before[1]) < 7.5 and abs(max(least, most - 60.0) - before[0]) < 7.5:
+        return before
+    low, high = shown_range([np.array([least, most])], span=60.0)
+    return min(low, high - 10.0), high
+
+
+def field_colours(levels: FloatArray, span: Span) -> Bytes:
+    """Colours of decibels (...): ENDED where they are -inf or NaN, the highest on caustics (inf)."""
+    low, high = span
+    share = (np.nan_to_num(levels, nan=low, posinf=high, neginf=low) - low) / (high - low)
+    out = coloured(FIELD_COLOURS, share)
+    out[~(levels > -np.inf)] = ENDED
+    return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +144,7 @@ class Paint:
     ----------
     mesh : trimesh.Trimesh
     strength : (n,) complex or None
-        Of the wave at its vertices, as of `creeping.explorer.wave`; None where colours are those of levels.
+        Of the wave at its vertices, as of `strengths`; None where colours are those of levels.
     """
 
     mesh: Any
@@ -159,7 +223,7 @@ class Scene:
         else:
             colours = field_colours(levels, span)
         curves, of = frame.level_segments
-        shades = np.repeat(LEVEL_COLOURS(of / frame.fan.length)[:, None], 2, axis=1)
+        shades = np.repeat(coloured(LEVEL_COLOURS, of / frame.fan.length)[:, None], 2, axis=1)
         with self.server.atomic():
             if self.painted is not None:
                 self.painted.visible = False

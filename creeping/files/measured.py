@@ -16,7 +16,7 @@ import numpy as np
 
 from creeping._typing import FloatArray
 from creeping.errors import InvalidInputError
-from creeping.storage.reading import opened
+from creeping.storage.atomic import opened
 
 MOST_BYTES = 200_000_000
 """Largest file that is read."""

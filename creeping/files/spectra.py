@@ -52,7 +52,7 @@ from creeping.storage.atomic import written_aside
 from creeping.storage.memory import required
 
 if TYPE_CHECKING:
-    from creeping.field.results.echo import Echo
+    from creeping.field.results.comparison import Echo
 
 HRTF, GENERAL = "SimpleFreeFieldHRTF", "GeneralTF"
 IMPEDANCE = 376.730313668

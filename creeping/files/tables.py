@@ -1,21 +1,19 @@
-"""Files of lines, fans, iso-phase curves, far fields, fields on planes and echoes: VTK (.vtp) and CSV.
+"""Files of lines, fans, iso-phase curves, far fields, fields on planes and echoes, as CSV.
 
 Numbers keep all 17 digits, so that what is read back is what was written. A table has one row for each point, direction
 or value; its columns are explained in lines that begin with ``#``.
 """
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.results.comparison import cross_section_decibels, decibels
-from creeping.field.results.echo import LEVELS
+from creeping.field.results.comparison import LEVELS, cross_section_decibels, decibels, error_decibels
 from creeping.field.results.point_result import FieldStatus
-from creeping.files.polylines import polydata
 from creeping.geometry.checks import UNKNOWN, unit_of
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
@@ -27,51 +25,12 @@ if TYPE_CHECKING:
 
     from creeping.field.cut_result import FieldCut
     from creeping.field.ports.coupling_result import Coupling
-    from creeping.field.results.echo import Echo
+    from creeping.field.results.comparison import Echo
     from creeping.field.results.far_result import FarField
     from creeping.field.results.impulse import RangeProfile
 
 Column = tuple[str, str, Any]
 """Name, what it holds (nothing if the name says it), and values (rows,)."""
-
-
-def write_vtp(
-    path: str | os.PathLike[str],
-    line: ShadowLine | None = None,
-    fan: RayFan | None = None,
-    curves: Sequence[IsoPhaseCurve] = (),
-) -> None:
-    """Write polylines as VTK XML PolyData, for ParaView, pyvista and others.
-
-    One polyline per curve of the shadow line, ray and iso-phase curve. Point arrays: travel_time, eikonal, spreading,
-    spreading_rate, curvature, attenuation, caustic_index, line_status (0 attached, 1 occluded, 2 concave), ray_status
-    (the ray's, from where it applies). Cell arrays: kind (0 shadow line, 1 ray, 2 iso-phase curve), ray (its number),
-    status (`RayStatus`), curve_index, level. Where an array does not apply it is NaN, or -1 if of integers.
-
-    Parameters
-    ----------
-    path : str or path
-        File to write; replaced at once when complete.
-    line, fan, curves
-        What to write; leave out what is not wanted.
-
-    Raises
-    ------
-    CreepingError
-        If the file cannot be written.
-    """
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
-
-    # to memory, then by Python: a full disk is an error here, whereas VTK's own writing to a file only logs it
-    writer = vtkXMLPolyDataWriter()
-    writer.SetInputData(polydata(line, fan, curves))
-    writer.SetHeaderTypeToUInt64()
-    # binary, because VTK's reader stops at an ascii nan
-    writer.SetDataModeToBinary()
-    writer.WriteToOutputStringOn()
-    writer.Write()
-    with written_aside(path) as aside:
-        aside.write_text(writer.GetOutputString(), encoding="ascii")
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
@@ -117,23 +76,21 @@ def write_csv(
     CreepingError
         If the file cannot be written.
     """
-    parts = {"line": line, "fan": fan, "curves": curves, "far": far, "cut": cut}
-    given = [name for name, value in parts.items() if value is not None]
+    makers: dict[str, tuple[Any, Callable[[Any], list[Column]]]] = {
+        "line": (line, _line_columns),
+        "fan": (fan, _fan_columns),
+        "curves": (curves, _curve_columns),
+        "far": (far, lambda one: _far_columns(one, observed)),
+        "cut": (cut, _cut_columns),
+    }
+    given = {name: pair for name, pair in makers.items() if pair[0] is not None}
     if len(given) != 1:
         raise InvalidInputError(
-            f"write_csv got {' and '.join(given) or 'nothing'}; give exactly one of {', '.join(parts)}, a file for each"
+            f"write_csv got {' and '.join(given) or 'nothing'}; give exactly one of {', '.join(makers)}, "
+            "a file for each"
         )
-    if line is not None:
-        columns = _line_columns(line)
-    elif fan is not None:
-        columns = _fan_columns(fan)
-    elif curves is not None:
-        columns = _curve_columns(curves)
-    elif far is not None:
-        columns = _far_columns(far, observed)
-    else:
-        columns = _cut_columns(cut)
-    _write_table(path, columns, mark)
+    ((what, columns_of),) = given.values()
+    _write_table(path, columns_of(what), mark)
 
 
 def _write_table(path: str | os.PathLike[str], columns: Sequence[Column], mark: str = "") -> None:
@@ -380,14 +337,12 @@ def write_couplings(
     pairs = np.nonzero(~np.eye(len(names), dtype=bool))
     per, unit, ports = len(pairs[0]), couplings[0].unit, np.array(names)
     values, error = (joined(getattr(one, name)[pairs] for one in couplings) for name in ("values", "error"))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        level, more = 20 * np.log10(np.abs(values)), 20 * np.log10(1 + error / np.abs(values))
     columns: list[Column] = [
         _wave_column(couplings, hertz, [per] * len(couplings)),
         ("source", "name of the port", np.tile(ports[pairs[0]], len(couplings))),
         ("receiver", "name of the port", np.tile(ports[pairs[1]], len(couplings))),
-        ("level_db", f"20 log10 of the field of a unit moment, re {unit}", level),
-        ("error_db", "by how much the level may be higher", more),
+        ("level_db", f"20 log10 of the field of a unit moment, re {unit}", decibels(values)),
+        ("error_db", "by how much the level may be higher", error_decibels(values, error)),
         ("re", f"real part, {unit}; time factor exp(-i w t)", values.real),
         ("im", f"imaginary part, {unit}", values.imag),
         ("status", "of FieldStatus", [FieldStatus(code).name for one in couplings for code in one.status[pairs]]),

@@ -253,7 +253,7 @@ class Drawing:
         low, high = self.frame
         return self._at(*(0.5 * (low + high)))
 
-    def add_legend(self, figure: Any, *more: Any) -> None:
+    def add_legend(self, figure: Any, *more: Any, columns: int = 3) -> None:
         """Add a legend under a matplotlib figure, the shadow line first, ``more`` handles last."""
         from matplotlib.lines import Line2D
 
@@ -263,7 +263,7 @@ class Drawing:
             for stroke in named
         ]
         handles += more
-        figure.legend(handles=handles, loc="lower center", ncols=min(3, len(handles)), frameon=False, fontsize=8)
+        figure.legend(handles=handles, loc="lower center", ncols=min(columns, len(handles)), frameon=False, fontsize=8)
 
     def _at(self, right: float, up: float) -> FloatArray:
         """Point (3,) with the given place in the picture, at the depth of the body's middle."""
@@ -300,12 +300,6 @@ def rays_caption(
         faded = ""
     error = f"error of the rays' ends {fan.error.rms:.1e} rms" if fan.error.samples else ""
     return caption(line.body, line.source, error, faded, name=name)
-
-
-def bare(body: Any, direction: FloatArray, *, view: View | None = None, cells: int = 80) -> Drawing:
-    """Compose the picture of a body and a wave alone."""
-    mesh, normals = drawn_mesh(body, cells)
-    return Drawing(body, direction, view or shadow_view(direction), mesh, normals, [], LevelColours.of(()))
 
 
 def compose(

@@ -112,9 +112,7 @@ def strokes(
     colours = LevelColours.of(curves)
     for curve in curves:
         bound, free = curve_pieces(curve, fan, curve.points, ends)
-        # levels are read off the colour bar; a single one has none
-        label = "" if colours.high > colours.low or curve is not curves[0] else colours.words(curve.level)
-        colour = colours(curve.level)
+        colour, label = colours(curve.level), colours.label(curve is curves[0])
         found += [Stroke(bound, colour, 0.9, label=label, rank=1)] if bound else []
         found += [Stroke(free, colour, FADED_WIDTH, alpha=FADED, rank=1)] if free else []
     for status in STATUSES:
@@ -314,9 +312,10 @@ class LevelColours:
         unit = units.pop() if len(units) == 1 else UNKNOWN
         return cls(min(levels), max(levels), LEVEL_NAMES.get("".join(names), "".join(names)), unit)
 
-    def words(self, level: float) -> str:
-        """What a level is, with its unit if one is known."""
-        return f"{self.name} = {level:g}" + f" {self.unit}" * (self.unit != UNKNOWN)
+    def label(self, first: bool) -> str:
+        """What the legend calls a curve: levels are read off the colour bar, a single one, which has none, is told."""
+        unit = f" {self.unit}" * (self.unit != UNKNOWN)
+        return f"{self.name} = {self.low:g}{unit}" if first and self.high <= self.low else ""
 
     @property
     def mappable(self) -> Any:

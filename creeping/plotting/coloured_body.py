@@ -1,49 +1,225 @@
 """The body in colours of decibels: of the field on it, and of the currents of the whole body at their nodes.
 
-Also here: triangle meshes coloured by a number at their vertices, each from two opposite sides.
+The field is |u|, or |du/dn|/k where u = 0, as `creeping.field.on_body.surface_field` has it, lit and in the shadow.
+Also here: the field along rays.
 
 Wave fronts on it are where Re(u e^{-i phase}) = 0 on the triangles of its mesh, joined to polylines. On an edge of a
 triangle the real part is taken as linear; fronts are half a wavelength of the wave on the body apart.
 
-Sources: Derivations, F16.
+Sources: Derivations, F9 and F16.
 """
 
 import os
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
+from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError, SingularIncidenceError
+from creeping.field.arguments import checked
+from creeping.field.boundary import Boundary, BoundaryLike
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
+from creeping.field.on_body import surface_field
 from creeping.field.results.comparison import decibels, shown_range
 from creeping.field.results.labelled import COMPONENTS
-from creeping.field.results.point_result import PointField
+from creeping.field.results.point_result import PointField, SurfaceField
+from creeping.field.waves.surface import scalar_boundary
 from creeping.geometry.checks import unit_of
 from creeping.geometry.incident import PlaneWave
 from creeping.geometry.parts import why_no_rays
+from creeping.geometry.piecewise import drawn_mesh
 from creeping.geometry.surface import Surface, normal, project
 from creeping.geometry.triangulation import Triangulation
-from creeping.plotting._drawing import Drawing, View, bare, caption, compose
-from creeping.plotting._strokes import Stroke
-from creeping.plotting.pages import add_bar, beyond, new_figure, save_figure
-from creeping.plotting.pictures import brightness, chosen_backend, drawn_page
+from creeping.plotting._drawing import Drawing, View, caption, compose, shadow_view
+from creeping.plotting._strokes import LevelColours, Stroke, chosen_rays
+from creeping.plotting.pages import PAGE, add_bar, beyond, curve_style, dressed, save_figure, written_figure
+from creeping.plotting.pictures import chosen_backend, drawn_page
+from creeping.rays.fan import RayFan
 from creeping.shadow.line import shadow_line
 
 NOTHING = "#b4b9bd"
 """Colour of what has no level."""
 WIDTH, REACH = 0.22, 2.5
 """Standard deviation, in wavelengths, of the Gaussian that smooths currents, and where it ends, in it."""
-SIDES = [[0, 1], [1, 2], [2, 0]]
 LEAST_SAMPLES = 4.5
 """Edges of triangles, or points of a grid, a wavelength from which fronts can be told."""
-VIEWS = (View(np.radians(-60.0), np.radians(25.0)), View(np.radians(120.0), np.radians(-25.0)))
-HIGHEST, SPAN = 0.0, (3.0, 6.0)
-"""Power of ten at the upper end of a mesh's colours, and the fewest and most decades below it."""
-BAD_COLOUR = "#b3202a"
-MESH_WIDTH, MESH_HEIGHT = 7.2, 3.4  # inches, of one mesh
+CAUSTIC: dict[str, Any] = {"linewidth": 0.7, "linestyle": (0, (4, 3))}
+
+
+def surface_field_picture(
+    path: str | os.PathLike[str],
+    fan: RayFan,
+    *,
+    wavenumber: float,
+    boundary: BoundaryLike = "soft",
+    order: int = 2,
+    backend: str = "auto",
+    view: View | None = None,
+    span: float = 60.0,
+    fronts: bool = False,
+    phase: float = 0.0,
+    wave: str = "",
+    name: str = "",
+    cells: int | None = None,
+    dpi: int = 300,
+) -> str:
+    """Write a PNG of the body coloured by the magnitude of the total field on it, with the shadow line on top.
+
+    Parameters
+    ----------
+    path : str or path
+        File to write.
+    fan : RayFan
+        Long enough to cover the shadow; where no ray passes the body is grey.
+    wavenumber : float, 1/L
+    boundary : "soft", "hard" or ImpedanceBoundary
+    order : 2 or 1
+    backend : str
+        "pyvista", "matplotlib" or "auto".
+    view : View, optional
+        Camera; by default on the shadow side.
+    span : float, dB
+        Range of the colours below the highest level, but for that of a few points.
+    fronts : bool
+        Whether to draw wave fronts, Re(u e^{-i phase}) = 0, where the field is OK.
+    phase : float, radians
+        omega t.
+    wave : str
+        What the picture says of the wave; the wavenumber if not given.
+    name : str
+        What the title calls the body; its repr if not given.
+    cells : int, optional
+        Fineness of the body, cells along each side of its box; by default eight a wavelength, within 48 to 96.
+    dpi : int
+
+    Returns
+    -------
+    str
+        "pyvista" or "matplotlib", whichever drew it.
+
+    Raises
+    ------
+    InvalidInputError
+        On a bad wavenumber, boundary, order, backend or span, for a weighted body, and if the mesh is too coarse
+        for the fronts asked for.
+    CreepingError
+        If pyvista is asked for and cannot draw here, or the file cannot be written.
+    """
+    backend = chosen_backend(backend)
+    kind = scalar_boundary(boundary)
+    k = checked(wavenumber, order)
+    drawing = compose(fan.line, view=view, cells=cells or cells_of(fan.body, k))
+    field = surface_field(fan, drawing.mesh.vertices, wavenumber=k, boundary=boundary, order=order)
+    known = field.ok & np.isfinite(field.error)
+    off = f"error where OK {np.median(field.error[known]):.1g} in the median" if known.any() else ""
+    drawing = replace(drawing, title=caption(fan.body, fan.line.source, off, name=name))
+    if fronts:
+        drawing = with_fronts(drawing, field, phase)
+    levels = levels_of(_scaled(field, kind))
+    label = f"{_name(kind)}\n{wave or f'k = {k:g}/{unit_of(fan.body)}'}, {_boundary_name(kind)}"
+    return save_painted(path, drawing, levels, span=span, label=label, bare="no ray passes", backend=backend, dpi=dpi)
+
+
+def surface_values(
+    fan: RayFan, points: FloatArray, *, wavenumber: float, boundary: BoundaryLike = "soft", order: int = 2
+) -> ComplexArray:
+    """The field at points of the body, u, or du/dn/k of the soft boundary: (n, 3) -> (n,), 0 where no ray passes."""
+    field = surface_field(fan, points, wavenumber=wavenumber, boundary=boundary, order=order)
+    return _scaled(field, scalar_boundary(boundary))
+
+
+def _scaled(field: SurfaceField, kind: Boundary) -> ComplexArray:
+    return np.asarray(field.values / (field.wavenumber if kind.kind == "soft" else 1.0))
+
+
+def levels_of(values: ComplexArray) -> FloatArray:
+    """20 log10 of magnitudes (n,): NaN where they are 0, inf where they are NaN, on a caustic."""
+    size = np.abs(values)
+    size = np.where(np.isnan(size), np.inf, size)
+    return decibels(np.where(size > 0, size, np.nan))
+
+
+def decay_picture(
+    path: str | os.PathLike[str],
+    fan: RayFan,
+    *,
+    wavenumber: float,
+    boundary: BoundaryLike = "soft",
+    order: int = 2,
+    rays: int = 6,
+    span: float = 80.0,
+    dpi: int = 300,
+) -> None:
+    """Write a PNG of each ray's own field against the way along it, for a few rays spread over the shadow line.
+
+    The curves rise at caustics, which dashed lines mark, and end where a ray has detached.
+
+    Parameters
+    ----------
+    path : str or path
+    fan : RayFan
+    wavenumber : float, 1/L
+    boundary : "soft", "hard" or ImpedanceBoundary
+    order : 2 or 1
+    rays : int
+        Rays drawn at most.
+    span : float, dB
+        Range below the field where the rays start.
+    dpi : int
+
+    Raises
+    ------
+    InvalidInputError
+        On a bad wavenumber, boundary, order, number of rays or span, and for a weighted body.
+    CreepingError
+        If the file cannot be written.
+    """
+    from matplotlib.lines import Line2D
+
+    kind = scalar_boundary(boundary)
+    k = checked(wavenumber, order)
+    picked = chosen_rays(fan, rays)
+    if not picked:
+        raise InvalidInputError("the fan has no ray to draw; launch one from another shadow line")
+    field = surface_field(fan, wavenumber=k, boundary=boundary, order=order)[picked]
+    levels = decibels(field / k if kind.kind == "soft" else field)
+    levels[~np.isfinite(levels)] = np.nan
+    # beside a caustic a step of a ray may lie at any height: the range follows the starts
+    starts = levels[:, : max(2, levels.shape[1] // 8)]
+    low, high = shown_range([np.clip(levels, -np.inf, np.nanmax(starts) + 10.0)], span)
+    with written_figure(path, PAGE, dpi) as figure:
+        ax = figure.add_subplot()
+        for number, (ray, level) in enumerate(zip(picked, levels, strict=True)):
+            _draw_decay(ax, fan, ray, level, curve_style(number, 1.2))
+        ax.set_xlim(0.0, float(fan.travel_time[-1]))
+        ax.set_ylim(low, high)
+        dressed(ax, f"arclength from the shadow line ({unit_of(fan.body)})", _name(kind))
+        title = f"Field of single rays, k = {k:g}/{unit_of(fan.body)}, {_boundary_name(kind)} boundary"
+        ax.set_title(title, fontsize=9, parse_math=False)
+        handles = ax.get_legend_handles_labels()[0]
+        if np.any(fan.caustic_index[picked]):
+            handles.append(Line2D([], [], color=NOTHING, label="caustic", **CAUSTIC))
+        figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
+
+
+def _draw_decay(ax: Any, fan: RayFan, ray: int, level: FloatArray, style: dict[str, Any]) -> None:
+    ax.plot(fan.travel_time, level, label=f"ray {ray}", **style)
+    passed = np.diff(fan.caustic_index[ray])
+    for step in np.flatnonzero(passed > 0):
+        J = fan.spreading[ray, step : step + 2]
+        share = J[0] / (J[0] - J[1]) if J[0] * J[1] < 0 else 0.5
+        at = fan.travel_time[step] + share * (fan.travel_time[step + 1] - fan.travel_time[step])
+        ax.axvline(at, color=style["color"], alpha=0.7, **CAUSTIC)
+
+
+def _name(kind: Boundary) -> str:
+    return "20 log$_{10}$|∂u/∂n|/k (dB)" if kind.kind == "soft" else "20 log$_{10}$|u| (dB)"
+
+
+def _boundary_name(kind: Boundary) -> str:
+    return f"impedance η = {kind.admittance:g}" if kind.kind == "impedance" else kind.kind
 
 
 def currents_picture(
@@ -86,15 +262,19 @@ def currents_picture(
     backend = chosen_backend(backend)
     k = currents.wavenumber
     body: Any = currents.body
-    asked: Any = {"view": view, "cells": cells or cells_of(body, k)}
+    cells = cells or cells_of(body, k)
     direction = currents.direction
     line = None
     if not why_no_rays(body):
         # none is drawn that crosses itself
         with suppress(SingularIncidenceError):
             line = shadow_line(body, direction)
-    drawing = compose(line, **asked) if line else bare(body, direction, **asked)
-    drawing = replace(drawing, title=caption(body, PlaneWave(direction), name=name))
+    title = caption(body, PlaneWave(direction), name=name)
+    if line:
+        drawing = replace(compose(line, view=view, cells=cells), title=title)
+    else:
+        camera = view or shadow_view(direction)
+        drawing = Drawing(body, direction, camera, *drawn_mesh(body, cells), [], LevelColours.of(()), title=title)
     levels = current_levels(currents, drawing.mesh.vertices, incident)
     what = {"soft": "|∂u/∂n|/k", "conductor": "|n × H|"}.get(currents.boundary.kind, "|u|")
     wave = wave or f"k = {k:g}/{unit_of(currents.body)}"
@@ -107,11 +287,6 @@ def current_levels(currents: SurfaceCurrents, points: FloatArray, incident: str 
 
     |n x H| of a conductor, of one incident polarisation or the root mean square of both; |u|, |du/dn|/k if soft.
     """
-    return decibels(_magnitudes(currents, points, incident))
-
-
-def _magnitudes(currents: SurfaceCurrents, points: FloatArray, incident: str | None) -> FloatArray:
-    """Magnitude of the currents at points of the body (n, 3), NaN where there are none: (n,)."""
     conductor = currents.values.ndim > 1
     if incident is not None and (incident not in COMPONENTS or not conductor):
         raise InvalidInputError(f"incident = {incident!r} is not {' or '.join(COMPONENTS)}, of a conductor's currents")
@@ -122,7 +297,7 @@ def _magnitudes(currents: SurfaceCurrents, points: FloatArray, incident: str | N
         size = np.sqrt(np.mean(each**2, axis=1)) if incident is None else each[:, COMPONENTS.index(incident)]
     elif currents.boundary.kind == "soft":
         size = size / currents.wavenumber
-    return np.where(covered, size, np.nan)
+    return decibels(np.where(covered, size, np.nan))
 
 
 def _currents_at(currents: SurfaceCurrents, points: FloatArray) -> tuple[ComplexArray, BoolArray]:
@@ -218,7 +393,7 @@ def at_phase(wave: ComplexArray, phase: float) -> FloatArray:
 
 def samples_a_wave(mesh: Triangulation, wavenumber: float) -> float:
     """Edges of a mesh a wavelength, by its median edge."""
-    sides = mesh.vertices[mesh.triangles[:, SIDES]]
+    sides = mesh.vertices[mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]]]
     return 2 * np.pi / (wavenumber * float(np.median(np.linalg.norm(np.diff(sides, axis=2), axis=-1))))
 
 
@@ -238,54 +413,21 @@ def front_strokes(
     InvalidInputError
         If the mesh is too coarse for the wavelength.
     """
-    edges = mesh.triangles[:, SIDES]
+    import pyvista
+
     there = samples_a_wave(mesh, wavenumber)
     if there < LEAST_SAMPLES:
         raise InvalidInputError(
             f"wave fronts on a mesh of {there:.2g} edges a wavelength; {LEAST_SAMPLES:g} are the least: give "
             f"{LEAST_SAMPLES / there:.2g} times the cells, or leave fronts out"
         )
-    real = at_phase(np.where(known, wave, 0.0), phase)
-    edges = edges[np.all(known[mesh.triangles], axis=1)]
-    # a corner at 0 counts as positive: each triangle is crossed by none of its edges or by two
-    crossed = (real[edges[..., 0]] < 0) != (real[edges[..., 1]] < 0)
-    pairs = np.sort(edges[crossed], axis=1).reshape(-1, 2, 2)
-    if not len(pairs):
+    triangles = mesh.triangles[np.all(known[mesh.triangles], axis=1)]
+    if not len(triangles):
         return []
-    ends, place = np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True)
-    low, high = real[ends[:, 0]], real[ends[:, 1]]
-    share = (low / (low - high))[:, None]
-    points = project(body, (1 - share) * mesh.vertices[ends[:, 0]] + share * mesh.vertices[ends[:, 1]])
-    lines = [points[chain] for chain in chains(place.reshape(-1, 2))]
-    return [Stroke(lines, "#00c2d1", 0.6, alpha=0.8, label="wave fronts", rank=1, through=False)]
-
-
-def chains(segments: IntArray) -> list[IntArray]:
-    """Polylines of segments (m, 2) between nodes that belong to two of them at most; a closed one ends as it begins.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> [chain.tolist() for chain in chains(np.array([[4, 7], [1, 2], [2, 4], [8, 9], [9, 5], [5, 8]]))]
-    [[1, 2, 4, 7], [8, 9, 5, 8]]
-    """
-    at: dict[int, list[int]] = {}
-    for number, (one, other) in enumerate(segments.tolist()):
-        at.setdefault(one, []).append(number)
-        at.setdefault(other, []).append(number)
-    left = np.ones(len(segments), dtype=bool)
-    found = []
-    # open ones from their ends, then what is closed
-    starts = [node for node, here in at.items() if len(here) == 1]
-    for start in sorted(starts) + segments[:, 0].tolist():
-        nodes = [start]
-        while ahead := [number for number in at[nodes[-1]] if left[number]]:
-            left[ahead[0]] = False
-            one, other = segments[ahead[0]].tolist()
-            nodes.append(other if one == nodes[-1] else one)
-        if len(nodes) > 1:
-            found.append(np.array(nodes))
-    return found
+    part = pyvista.PolyData.from_regular_faces(mesh.vertices, triangles)
+    found = part.contour([0.0], at_phase(np.where(known, wave, 0.0), phase)).strip(join=True, max_length=len(triangles))
+    lines = [project(body, cell.points) for cell in found.cell if cell.n_points > 1]
+    return [Stroke(lines, "#00c2d1", 0.6, alpha=0.8, label="wave fronts", rank=1, through=False)] if lines else []
 
 
 def with_fronts(drawing: Drawing, field: PointField, phase: float) -> Drawing:
@@ -301,94 +443,3 @@ def with_fronts(drawing: Drawing, field: PointField, phase: float) -> Drawing:
     return replace(
         drawing, strokes=front_strokes(drawing.body, drawing.mesh, field.values, known, **asked) + drawing.strokes
     )
-
-
-@dataclass(frozen=True)
-class MeshValues:
-    """One mesh to be drawn.
-
-    Attributes
-    ----------
-    vertices : (n, 3)
-    triangles : (m, 3)
-    values : (n,)
-        Positive; colours are of their logarithm.
-    bad : (n,) bool
-        Vertices that get a dot.
-    title : str
-    """
-
-    vertices: FloatArray
-    triangles: IntArray
-    values: FloatArray
-    bad: BoolArray
-    title: str = ""
-
-
-def mesh_picture(
-    path: str | os.PathLike[str],
-    *meshes: MeshValues,
-    label: str = "disagreement of jets of degree 4 and 6",
-    dpi: int = 200,
-) -> None:
-    """Write a PNG of meshes, one below the other.
-
-    Parameters
-    ----------
-    path : str or path
-        File to write.
-    meshes : MeshValues
-    label : str
-        Of the colour bars.
-    dpi : int
-
-    Raises
-    ------
-    CreepingError
-        If the file cannot be written.
-    """
-    figure = new_figure((MESH_WIDTH, MESH_HEIGHT * len(meshes)))
-    for row, mesh in enumerate(meshes):
-        _draw_mesh(figure, 1 - (row + 1) / len(meshes), 1 / len(meshes), mesh, label)
-    save_figure(figure, path, dpi)
-
-
-def _draw_mesh(figure: Any, bottom: float, height: float, mesh: MeshValues, label: str) -> None:
-    """Draw one mesh into a band of the figure."""
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.collections import PolyCollection
-    from matplotlib.colors import Normalize
-
-    decade = np.log10(np.maximum(mesh.values, 10.0 ** (HIGHEST - SPAN[1])))
-    lowest = float(np.clip(np.floor(np.percentile(decade, 1)), HIGHEST - SPAN[1], HIGHEST - SPAN[0]))
-    colours = ScalarMappable(Normalize(lowest, HIGHEST), "viridis")
-    corners = mesh.vertices[mesh.triangles]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    paint = colours.to_rgba(decade[mesh.triangles].mean(axis=1))[:, :3]
-    for k, view in enumerate(VIEWS):
-        ax = figure.add_axes((0.01 + 0.43 * k, bottom + 0.04 * height, 0.42, 0.86 * height))
-        facing = normals @ view.toward
-        front = np.flatnonzero(facing > 0)
-        # the far ones first, so that the near ones cover them
-        front = front[np.argsort(corners[front].mean(axis=1) @ view.toward)]
-        shade = (0.6 + 0.4 * brightness(facing[front]))[:, None] * paint[front]
-        flat = view.project(corners[front])
-        # edges in the colour of the face close the hairlines between triangles
-        ax.add_collection(PolyCollection(list(flat), facecolors=shade, edgecolors=shade, linewidths=0.3))
-        seen = np.intersect1d(np.flatnonzero(mesh.bad), mesh.triangles[front])
-        dots = view.project(mesh.vertices[seen]).T
-        # rims of white: red on dark blue is hard to see for the colour-blind
-        ax.plot(*dots, ".", color="white", markersize=6.0, markeredgewidth=0)
-        ax.plot(*dots, ".", color=BAD_COLOUR, markersize=3.6, markeredgewidth=0)
-        ax.autoscale_view()
-        ax.set_aspect("equal")
-        ax.set_axis_off()
-    rough = f"{int(mesh.bad.sum())} of {len(mesh.vertices)} vertices rough"
-    figure.text(0.02, bottom + 0.94 * height, mesh.title, fontsize=9, va="center")
-    colour = BAD_COLOUR if mesh.bad.any() else "black"
-    figure.text(0.86, bottom + 0.94 * height, rough, fontsize=8, va="center", ha="right", color=colour)
-    place = figure.add_axes((0.885, bottom + 0.1 * height, 0.018, 0.76 * height))
-    bar = add_bar(figure, colours, label, fontsize=7, extend="min", cax=place)
-    ticks = np.arange(lowest, HIGHEST + 1)
-    bar.set_ticks(ticks, labels=[f"$10^{{{int(t)}}}$" for t in ticks])

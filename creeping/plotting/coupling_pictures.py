@@ -16,7 +16,7 @@ from creeping.errors import InvalidInputError
 from creeping.field.boundary import BoundaryLike
 from creeping.field.frequency import suited
 from creeping.field.ports.port_map import PortField, port_field
-from creeping.field.results.comparison import decibels, shown_range
+from creeping.field.results.comparison import decibels, error_decibels, shown_range
 from creeping.field.results.labelled import power
 from creeping.field.results.point_result import FieldStatus
 from creeping.geometry.directions import tangent_frames
@@ -164,9 +164,8 @@ def plot_coupling(
     if names:
         ax.set_xticks(range(count), names, rotation=45 if max(map(len, names)) > 4 else 0)
         ax.set_yticks(range(count), names)
-    good = found.ok & (np.abs(found.values) > 0)
-    share = np.median(found.error[good] / np.abs(found.values[good])) if good.any() else np.nan
-    told = f", error {20 * np.log10(1 + share):.2g} dB in the median" if np.isfinite(share) else ""
+    off = error_decibels(found.values, found.error)[found.ok & (np.abs(found.values) > 0)]
+    told = f", error {np.median(off):.2g} dB in the median" if np.any(np.isfinite(off)) else ""
     return pages.finished(ax, fresh, pages.wave_title(found, found.length_unit) + told, legend)
 
 

@@ -5,6 +5,7 @@ backscatter in all directions, the size of its entries by degrees of the waves, 
 """
 
 import os
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -13,8 +14,7 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.frequency import suited
-from creeping.field.results.comparison import decibels, shown_range
-from creeping.field.results.echo import LEVELS
+from creeping.field.results.comparison import LEVELS, decibels, shown_range
 from creeping.field.results.impulse import range_profile
 from creeping.field.tmatrix.patterns import degrees_of
 from creeping.geometry.directions import directions_from_azimuth_elevation
@@ -22,8 +22,7 @@ from creeping.plotting import pages
 from creeping.plotting.far_cuts import COMPONENTS, QUANTITIES, Curve, draw_curves, draw_cut, heights_of
 
 if TYPE_CHECKING:
-    from creeping.field.results.comparison import Comparison
-    from creeping.field.results.echo import Echo
+    from creeping.field.results.comparison import Comparison, Echo
     from creeping.field.results.impulse import ImpulseResponse, RangeProfile
     from creeping.field.tmatrix.result import TMatrix
 
@@ -70,29 +69,6 @@ def echo_picture(
         if echo.unresolved.any():
             patch = Patch(facecolor="white", edgecolor=pages.GREY, linewidth=0.5, label="veiled: unresolved")
             figure.legend(handles=[patch], loc="outside lower center", frameon=False, fontsize=8)
-
-
-def draw_echo_cut(ax: Any, echo: "Echo", span: float = SPAN) -> None:
-    """Draw an echo of several angles at its first wavenumber, on straight or polar axes."""
-    curves = _curves(echo, (slice(None), 0))
-    heights = heights_of(curves, span)
-    curves = _told_if_low(curves, heights[0])
-    draw_cut(ax, np.radians(echo.angles), curves, heights, level=_level(echo), angle_name=echo.angle_name)
-
-
-def draw_echo_band(ax: Any, echo: "Echo", span: float = SPAN) -> None:
-    """Draw an echo against frequency at its first angle."""
-    curves = _curves(echo, (0, slice(None)))
-    low, high = heights_of(curves, span)
-    scale, unit = suited(float(echo.hertz.max()))
-    x = echo.hertz / scale
-    draw_curves(ax, x, _told_if_low(curves, low), (low, high))
-    doubtful = echo.unresolved[:, 0].any(axis=0)
-    if doubtful.any():
-        ax.plot(x[doubtful], np.full(doubtful.sum(), low), "|", color=pages.GREY, clip_on=False, label="unresolved")
-    ax.set_xlim(x[0], x[-1])
-    ax.set_ylim(low, high)
-    pages.dressed(ax, f"frequency ({unit})", _level(echo))
 
 
 def draw_echo_map(ax: Any, echo: "Echo", number: int, heights: tuple[float, float]) -> None:
@@ -144,8 +120,20 @@ def plot_echo(
     if angles > 1 and waves > 1:
         draw_echo_map(ax, echo, number, shown_range([echo.levels()[number]], span))
         return pages.finished(ax, fresh, f"{echo.channels[number]}; veiled: unresolved", legend=False)
-    draw = draw_echo_cut if angles > 1 else draw_echo_band
-    draw(ax, echo, span)
+    at = (slice(None), 0) if angles > 1 else (0, slice(None))
+    curves = _curves(echo, at)
+    low, high = heights_of(curves, span)
+    curves = _told_if_low(curves, low)
+    if angles > 1:
+        draw_cut(ax, np.radians(echo.angles), curves, (low, high), level=_level(echo), angle_name=echo.angle_name)
+    else:
+        scale, unit = suited(float(echo.hertz.max()))
+        x, doubtful = echo.hertz / scale, echo.unresolved[:, 0].any(axis=0)
+        draw_curves(ax, x, curves, (low, high))
+        if doubtful.any():
+            ax.plot(x[doubtful], np.full(doubtful.sum(), low), "|", color=pages.GREY, clip_on=False, label="unresolved")
+        ax.set(xlim=(x[0], x[-1]), ylim=(low, high))
+        pages.dressed(ax, f"frequency ({unit})", _level(echo))
     pages.add_legend(ax, fresh, legend)
     return ax
 
@@ -293,30 +281,40 @@ def plot_impulse(
         raise InvalidInputError(
             f"{envelope.shape[1]} responses in one picture; draw {len(pages.COLOURS)} at most, or one by one"
         )
-    low, high = _ends(found.delay, start, end)
+    ends = _ends(found.delay, start, end)
     seconds = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
-    scale, unit = (1.0, found.unit) if found.unit != "s" else suited(max(abs(low), abs(high)), seconds)
-    shown = (found.delay >= low) & (found.delay <= high)
-    levels = decibels(envelope)
-    heights = shown_range([levels[shown]], span)
-    fresh, ax = pages.axes_or_new(ax, pages.PAGE)
+    scale, unit = (1.0, found.unit) if found.unit != "s" else suited(max(map(abs, ends)), seconds)
     several = envelope.shape[1] > 1
-    bounds = np.ravel(found.error)
-    # the legend lists what was drawn last first
-    for number in reversed(range(envelope.shape[1])):
-        name = f"response {number}" if several else "envelope"
-        style = pages.curve_style(number)
-        curve = np.maximum(levels[:, number], heights[0] - (heights[1] - heights[0]))
-        if 0 < bounds[number] < np.inf:
-            colour = style["color"] if several else pages.GREY
-            _draw_bound(ax, float(decibels(bounds[number])), colour, first=not (several and number))
-        ax.plot(found.delay / scale, curve, label=name, **style)
-    ax.set_xlim(low / scale, high / scale)
-    ax.set_ylim(*heights)
+    names = [f"response {number}" for number in range(envelope.shape[1])] if several else ["envelope"]
+    fresh, ax = pages.axes_or_new(ax, pages.PAGE)
+    _draw_levels(ax, found.delay, envelope, np.ravel(found.error), ends, names, span, scale)
     what = "length of the path" if found.unit == "L" else "delay"
     title = f"resolution {found.resolution / scale:.3g} {unit}, repeats after {found.period / scale:.4g} {unit}"
     pages.dressed(ax, f"{what} ({unit})", "envelope (dB)")
     return pages.finished(ax, fresh, title, legend)
+
+
+def _draw_levels(
+    ax: Any,
+    x: FloatArray,
+    sizes: FloatArray,
+    bounds: FloatArray,
+    ends: tuple[float, float],
+    names: Sequence[str],
+    span: float,
+    scale: float = 1.0,
+) -> None:
+    """Draw sizes (m, n) in decibels over x (m,) from one end to the other, the bounds of their errors (n,) dotted."""
+    levels, shown = decibels(sizes), (x >= ends[0]) & (x <= ends[1])
+    low, high = shown_range([levels[shown]], span)
+    # the legend lists what was drawn last first
+    for number, name in reversed(list(enumerate(names))):
+        style = pages.curve_style(number)
+        if 0 < bounds[number] < np.inf:
+            colour = style["color"] if len(names) > 1 else pages.GREY
+            _draw_bound(ax, float(decibels(bounds[number])), colour, first=not number)
+        ax.plot(x / scale, np.maximum(levels[:, number], low - (high - low)), label=name, **style)
+    ax.set(xlim=(ends[0] / scale, ends[1] / scale), ylim=(low, high))
 
 
 def plot_profile(
@@ -333,16 +331,9 @@ def plot_profile(
 
     Parameters are as of `plot_impulse`, and ``unit``, that of lengths.
     """
-    low, high = _ends(found.range, start, end)
-    levels = decibels(found.values)
-    heights = shown_range([levels[(found.range >= low) & (found.range <= high)]], span)
+    ends = _ends(found.range, start, end)
     fresh, ax = pages.axes_or_new(ax, pages.PAGE)
-    floor = heights[0] - (heights[1] - heights[0])
-    if 0 < found.error < np.inf:
-        _draw_bound(ax, float(decibels(np.array(found.error))), pages.GREY, first=True)
-    ax.plot(found.range, np.maximum(levels, floor), label="profile", **pages.curve_style(0))
-    ax.set_xlim(low, high)
-    ax.set_ylim(*heights)
+    _draw_levels(ax, found.range, np.abs(found.values)[:, None], np.array([found.error]), ends, ["profile"], span)
     pages.dressed(ax, f"range along the line of sight ({unit})", f"20 log$_{{10}}$|h| (dB re 1 {unit})")
     pages.finished(ax, fresh, f"resolution {found.resolution:.3g} {unit}", legend=False)
     # one curve has a legend only where it is asked for, and inside

@@ -347,7 +347,7 @@ def _round_axes(ax: Any, _: FloatArray, heights: tuple[float, float], label: str
     for text in [one for one in ax.texts if one.get_gid() == "ring"]:
         text.remove()
     halo = [withStroke(linewidth=2.0, foreground="white")]
-    look: dict[str, Any] = {"fontsize": 7, "color": "#5a6872", "ha": "center", "va": "center", "gid": "ring"}
+    look: dict[str, Any] = {"fontsize": 7, "color": pages.GREY, "ha": "center", "va": "center", "gid": "ring"}
     for ring in rings:
         ax.text(np.radians(165), ring, pages.minus(ring), path_effects=halo, zorder=4, **look)
     ax.tick_params(axis="x", labelsize=8)

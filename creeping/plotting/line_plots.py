@@ -32,7 +32,7 @@ def line_of(curve: ShadowCurve) -> ShadowLine:
 
 
 def plot_line(
-    line: ShadowLine,
+    line: ShadowLine | ShadowCurve | RayFan,
     ax: Any = None,
     *,
     kind: str | None = None,
@@ -46,7 +46,8 @@ def plot_line(
 
     Parameters
     ----------
-    line : ShadowLine
+    line : ShadowLine, ShadowCurve or RayFan
+        A fan is drawn with its line.
     ax : matplotlib.axes.Axes, optional
         By default those of a new figure.
     kind : {"parameters", "3d"}
@@ -76,6 +77,11 @@ def plot_line(
     InvalidInputError
         If the kind is unknown or not that of the axes, or a view is given for the plane.
     """
+    if isinstance(line, RayFan):
+        fan = line
+        line = fan.line
+    elif isinstance(line, ShadowCurve):
+        line = line_of(line)
     if _in_space(ax, kind):
         drawing = compose(line, fan, curves, view=view, **shown)
         if ax is None:
@@ -246,13 +252,11 @@ def draw_curves(
     """
     colours = LevelColours.of(curves)
     for curve in curves:
-        # levels are read off the colour bar; a single one has none
-        label = "" if colours.high > colours.low or curve is not curves[0] else colours.words(curve.level)
         bound, free = (
             [piece for part in parts for piece in split_at_seam(part, closed=False)]
             for parts in _strokes.curve_pieces(curve, fan, curve.parameters, ends)
         )
-        colour = colours(curve.level)
+        colour, label = colours(curve.level), colours.label(curve is curves[0])
         _add(ax, bound, color=colour, linewidth=1.0, label=label, zorder=3)
         _add(ax, free, color=colour, linewidth=_strokes.FADED_WIDTH, alpha=_strokes.FADED, zorder=3)
     return colours

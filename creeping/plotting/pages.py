@@ -37,7 +37,7 @@ STYLES: tuple[Any, ...] = (
 )
 """Of matplotlib: no two curves of a picture have the same one until all are taken."""
 GREY = "#5a6872"
-"""Of marks and lines that are no curve."""
+"""Of marks, lines that are no curve, and bodies in section."""
 EXACT = "#111111"
 
 
@@ -126,12 +126,10 @@ def wave_title(field: Any, unit: str) -> str:
     return f"k = {field.wavenumber:g}/{unit}, {field.boundary}"
 
 
-def dressed(ax: Any, across: str, up: str, title: str | None = None) -> None:
-    """Give straight axes their names, grid and ticks, and a title."""
+def dressed(ax: Any, across: str, up: str) -> None:
+    """Give straight axes their names, grid and ticks."""
     ax.set_xlabel(across, fontsize=9)
     ax.set_ylabel(up, fontsize=9)
-    if title is not None:
-        ax.set_title(title, fontsize=9, parse_math=False)
     ax.grid(color="#d9dde0", linewidth=0.5)
     ax.tick_params(labelsize=8, direction="in", top=True, right=True, width=0.5, which="both")
 

@@ -4,29 +4,35 @@ Also here: the picture with matplotlib, for axes that are given and where OpenGL
 looking, not by a depth buffer: mplot3d sorts whole artists, not points. So the body is drawn first, and of each curve
 the visible part over it and the hidden part faintly; that holds for the view it was drawn for, not after turning the
 axes.
+
+Also here: triangle meshes coloured by a number at their vertices, each from two opposite sides.
 """
 
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Unpack
 
 import numpy as np
 
-from creeping._typing import Any, FloatArray
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.plotting._drawing import Drawing, View, compose
 from creeping.plotting._strokes import ARROW_COLOUR, BODY_COLOUR, HIDDEN, RayOptions, Stroke, runs
-from creeping.plotting.pages import InlineAxes3D, new_figure, save_figure
+from creeping.plotting.pages import PAGE, InlineAxes3D, add_bar, new_figure, save_figure
 from creeping.plotting.scene import gl_available, render
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowLine
 
-WIDTH = 6.4  # inches
 TITLE_SIZE = 8.0
 """Of the letters of a title, points."""
 FINER = 1.6
 """Pixels of what OpenGL renders for each of the file, along a side."""
+BAD_COLOUR = "#b3202a"
+"""Of vertices that are rough."""
+MESH_INCHES = (7.2, 3.4)
+"""Of the picture of one mesh."""
 Place = tuple[float, float, float, float]  # left, bottom, width, height, as shares of the figure
 
 
@@ -126,13 +132,13 @@ def drawn_page(drawing: Drawing, backend: str, dpi: int) -> tuple[Any, Place]:
 def _page(drawing: Drawing) -> tuple[Any, Place]:
     """Figure with room for the body's picture, the legend below and the colour bar at the right."""
     low, high = drawing.frame
-    width = 0.82 * WIDTH
+    width = 0.82 * PAGE[0]
     # neither a strip nor a tower: the rest of the room stays white
     body = float(np.clip(width * (high[1] - low[1]) / (high[0] - low[0]), 2.4, 4.6))
     legend = 0.55 if len({stroke.label for stroke in drawing.strokes} - {""}) > 3 else 0.38
     lines = drawing.title.count("\n") + 1 if drawing.title else 0
     height = body + legend + 0.05 + 0.16 * lines
-    return new_figure((WIDTH, height)), (0.01, legend / height, width / WIDTH, body / height)
+    return new_figure((PAGE[0], height)), (0.01, legend / height, width / PAGE[0], body / height)
 
 
 def _draw_pyvista(figure: Any, place: Place, drawing: Drawing, dpi: int) -> None:
@@ -258,3 +264,95 @@ def _measure(ax: Any, drawing: Drawing) -> tuple[FloatArray, FloatArray]:
     ends = np.stack([centre, centre + view.right, centre + view.up])
     pixels = ax.transData.transform(np.stack(proj_transform(*ends.T, ax.get_proj())[:2], axis=-1))
     return pixels[0], np.linalg.norm(pixels[1:] - pixels[0], axis=-1)
+
+
+@dataclass(frozen=True)
+class MeshValues:
+    """One mesh to be drawn.
+
+    Attributes
+    ----------
+    vertices : (n, 3)
+    triangles : (m, 3)
+    values : (n,)
+        Positive; colours are of their logarithm.
+    bad : (n,) bool
+        Vertices that get a dot.
+    title : str
+    """
+
+    vertices: FloatArray
+    triangles: IntArray
+    values: FloatArray
+    bad: BoolArray
+    title: str = ""
+
+
+def mesh_picture(
+    path: str | os.PathLike[str],
+    *meshes: MeshValues,
+    label: str = "disagreement of jets of degree 4 and 6",
+    dpi: int = 200,
+) -> None:
+    """Write a PNG of meshes, one below the other.
+
+    Parameters
+    ----------
+    path : str or path
+        File to write.
+    meshes : MeshValues
+    label : str
+        Of the colour bars.
+    dpi : int
+
+    Raises
+    ------
+    CreepingError
+        If the file cannot be written.
+    """
+    figure = new_figure((MESH_INCHES[0], MESH_INCHES[1] * len(meshes)))
+    for row, mesh in enumerate(meshes):
+        _draw_mesh(figure, 1 - (row + 1) / len(meshes), 1 / len(meshes), mesh, label)
+    save_figure(figure, path, dpi)
+
+
+def _draw_mesh(figure: Any, bottom: float, height: float, mesh: MeshValues, label: str) -> None:
+    """Draw one mesh into a band of the figure, from two opposite sides."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.collections import PolyCollection
+    from matplotlib.colors import Normalize
+
+    # from 1 three to six decades down
+    decade = np.log10(np.maximum(mesh.values, 1e-6))
+    lowest = float(np.clip(np.floor(np.percentile(decade, 1)), -6.0, -3.0))
+    colours = ScalarMappable(Normalize(lowest, 0.0), "viridis")
+    corners = mesh.vertices[mesh.triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    paint = colours.to_rgba(decade[mesh.triangles].mean(axis=1))[:, :3]
+    for k, view in enumerate((View(np.radians(-60.0), np.radians(25.0)), View(np.radians(120.0), np.radians(-25.0)))):
+        ax = figure.add_axes((0.01 + 0.43 * k, bottom + 0.04 * height, 0.42, 0.86 * height))
+        facing = normals @ view.toward
+        front = np.flatnonzero(facing > 0)
+        # the far ones first, so that the near ones cover them
+        front = front[np.argsort(corners[front].mean(axis=1) @ view.toward)]
+        shade = (0.6 + 0.4 * brightness(facing[front]))[:, None] * paint[front]
+        flat = view.project(corners[front])
+        # edges in the colour of the face close the hairlines between triangles
+        ax.add_collection(PolyCollection(list(flat), facecolors=shade, edgecolors=shade, linewidths=0.3))
+        seen = np.intersect1d(np.flatnonzero(mesh.bad), mesh.triangles[front])
+        dots = view.project(mesh.vertices[seen]).T
+        # rims of white: red on dark blue is hard to see for the colour-blind
+        ax.plot(*dots, ".", color="white", markersize=6.0, markeredgewidth=0)
+        ax.plot(*dots, ".", color=BAD_COLOUR, markersize=3.6, markeredgewidth=0)
+        ax.autoscale_view()
+        ax.set_aspect("equal")
+        ax.set_axis_off()
+    rough = f"{int(mesh.bad.sum())} of {len(mesh.vertices)} vertices rough"
+    figure.text(0.02, bottom + 0.94 * height, mesh.title, fontsize=9, va="center")
+    colour = BAD_COLOUR if mesh.bad.any() else "black"
+    figure.text(0.86, bottom + 0.94 * height, rough, fontsize=8, va="center", ha="right", color=colour)
+    place = figure.add_axes((0.885, bottom + 0.1 * height, 0.018, 0.76 * height))
+    bar = add_bar(figure, colours, label, fontsize=7, extend="min", cax=place)
+    ticks = np.arange(lowest, 1.0)
+    bar.set_ticks(ticks, labels=[f"$10^{{{int(t)}}}$" for t in ticks])

@@ -21,11 +21,6 @@ from creeping.geometry.parts import inside, why_no_rays
 from creeping.plotting import pages
 from creeping.plotting.coloured_body import LEAST_SAMPLES, NOTHING, at_phase
 
-PAGE = 6.4  # inches
-FRONT = "#ffffff"
-"""Colour of wave fronts."""
-SECTION = "#5a6872"
-"""Colour of the body's section."""
 HATCH, HATCHED = "///", "#6d767d"
 DOUBTFUL = "#a3476a", "#ffffff"
 """Colours in the legend of what is hatched upon the colours of the field."""
@@ -168,7 +163,7 @@ def _draw(
     _paint(cut, ax, values, label, pages.beyond(values, look["vmin"], look["vmax"]), look)
     if _with_fronts(cut, show, fronts):
         shown = np.where(missing, np.nan, _filled(wave, cut.outside))
-        ax.contour(cut.across, cut.up, shown, [0.0], colors=FRONT, linewidths=0.5, alpha=0.6, zorder=1.4)
+        ax.contour(cut.across, cut.up, shown, [0.0], colors="white", linewidths=0.5, alpha=0.6, zorder=1.4)
     hatch(cut, ax, size)
     dress(cut, ax)
 
@@ -239,7 +234,8 @@ def _title(cut: FieldCut) -> str:
 
 def _page(cut: FieldCut) -> tuple[float, float]:
     share = float(np.ptp(cut.up) / np.ptp(cut.across))
-    return PAGE, float(np.clip(0.74 * PAGE * share + 1.0, 2.4, 9.0))
+    width = pages.PAGE[0]
+    return width, float(np.clip(0.74 * width * share + 1.0, 2.4, 9.0))
 
 
 def missing_of(cut: FieldCut) -> BoolArray:
@@ -282,7 +278,7 @@ def dress(cut: FieldCut, ax: Any) -> None:
     points = grid_points(cut.point, cut.axes, across, up)
     level = _level(cut.body, points.reshape(-1, 3)).reshape(points.shape[:2])
     if level.min() < 0 < level.max():
-        ax.contourf(across, up, level, [level.min() - 1.0, 0.0], colors=SECTION, zorder=2)
+        ax.contourf(across, up, level, [level.min() - 1.0, 0.0], colors=pages.GREY, zorder=2)
         ax.contour(across, up, level, [0.0], colors="#111111", linewidths=0.8, zorder=2.1)
     ax.plot(*cut.shadow_points().T, "o", color="#111111", markeredgecolor="#ffffff", markersize=5, zorder=3)
     along = cut.axes @ cut.direction
@@ -342,14 +338,14 @@ def add_cut_legend(cut: FieldCut, ax: Any, *, fresh: bool, fronts: bool = False)
 
     handles: list[Any] = []
     if np.any(~cut.outside):
-        handles.append(Patch(facecolor=SECTION, edgecolor="#111111", label="body"))
+        handles.append(Patch(facecolor=pages.GREY, edgecolor="#111111", label="body"))
     if len(cut.shadow_points()):
         look: dict[str, Any] = {"color": "#111111", "markeredgecolor": "#ffffff", "markersize": 5}
         handles.append(Line2D([], [], marker="o", linestyle="none", label="shadow line", **look))
     if fronts:
         # white on white would not be seen
         around = [withStroke(linewidth=4.0, foreground="#8c4a6e")]
-        handles.append(Line2D([], [], color=FRONT, linewidth=1.0, path_effects=around, label="wave front"))
+        handles.append(Line2D([], [], color="white", linewidth=1.0, path_effects=around, label="wave front"))
     if words := status_words(cut):
         face, edge = (NOTHING, HATCHED) if np.any(missing_of(cut)) else DOUBTFUL
         handles.append(Patch(facecolor=face, edgecolor=edge, linewidth=0, hatch=HATCH, label=f"not OK: {words}"))

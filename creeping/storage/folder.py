@@ -14,7 +14,7 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray
 from creeping.errors import CreepingError, StoredMapError
-from creeping.storage.reading import bytes_of
+from creeping.storage.atomic import bytes_of
 
 SCHEMA = 4
 MANIFEST = "manifest.json"

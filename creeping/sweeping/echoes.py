@@ -18,7 +18,7 @@ from creeping.errors import InvalidInputError, SingularIncidenceError
 from creeping.field.arguments import checked, checked_across, checked_method, checked_plain
 from creeping.field.boundary import BoundaryLike
 from creeping.field.equation.solving import is_rough
-from creeping.field.results.echo import Echo
+from creeping.field.results.comparison import Echo
 from creeping.field.routes import by_equation_alone, expected_seconds
 from creeping.field.tmatrix.computing import pays
 from creeping.field.validity_range import is_reached

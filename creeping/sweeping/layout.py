@@ -17,9 +17,8 @@ import numpy as np
 from creeping._typing import Any
 from creeping.errors import CreepingError
 from creeping.geometry.checks import unit_of
-from creeping.storage.atomic import written_aside
+from creeping.storage.atomic import bytes_of, written_aside
 from creeping.storage.folder import content_digest
-from creeping.storage.reading import bytes_of
 from creeping.sweeping.plan import SweepPlan
 from creeping.sweeping.results import (
     MISSING,

@@ -27,8 +27,8 @@ from creeping.errors import CreepingError, InvalidInputError
 from creeping.geometry.surface import Surface
 from creeping.rays.transport import Flow
 from creeping.shadow.status import FAILED
+from creeping.storage.atomic import bytes_of
 from creeping.storage.folder import content_digest
-from creeping.storage.reading import bytes_of
 from creeping.sweeping.layout import (
     ERROR_BYTES,
     ERRORS,

@@ -13,7 +13,7 @@ from creeping.errors import InvalidInputError
 from creeping.geometry.parts import why_no_rays
 from creeping.geometry.surface import Surface, size
 from creeping.rays.reach import AUTO
-from creeping.storage.reading import text_of
+from creeping.storage.atomic import text_of
 from creeping.sweeping.plan import too_large
 from creeping.sweeping.request import (
     METHODS,

@@ -22,7 +22,7 @@ from creeping.geometry.directions import (
     theta_phi_grid,
     unit_directions,
 )
-from creeping.storage.reading import text_of
+from creeping.storage.atomic import text_of
 from creeping.sweeping.plan import short
 from creeping.sweeping.request import MOST_WAVENUMBERS
 

@@ -5,9 +5,10 @@ from functools import cache
 
 import numpy as np
 
+import creeping as cr
 import scatterers as sc
-from creeping._typing import Any, FloatArray
-from tests.reference import clouds
+from creeping._typing import Any, ComplexArray, FloatArray
+from tests.reference import clouds, dipoles, fundamental, sphere
 
 
 def _two_balls(gap: float) -> tuple[str, Callable[[FloatArray], FloatArray], Callable[[FloatArray], FloatArray]]:
@@ -58,16 +59,78 @@ def bodies() -> dict[str, tuple[Any, clouds.Spread, float]]:
     }
 
 
-DIPOLE_DEPTHS = {
-    "triaxial": 0.2,
-    "slender": 0.15,
-    "flat": 0.2,
-    "egg": 0.2,
-    "twisted": 0.12,
-    "peanut": 0.3,
-    "torus": 0.2,
-}
-"""Depths of a conductor's dipoles, L."""
+class Ball:
+    """Series of the unit sphere by the names of the other references, `fundamental.Solution` and `dipoles`."""
+
+    def __init__(self, k: float, incidences: FloatArray, boundary: Any) -> None:
+        self.k, self.directions, self.boundary = k, incidences, boundary
+        self.residual = np.zeros(len(incidences))
+
+    def far_field(self, r: FloatArray) -> ComplexArray:
+        """Far field (m, d), of a conductor scattered and incident along theta and phi (m, d, 2, 2)."""
+        each = conducting_ball if self.boundary == "pec" else _scalar_ball
+        return np.stack([each(self.k, d, r, self.boundary) for d in self.directions], axis=1)
+
+    def total(self, x: FloatArray) -> Any:
+        """Total field (n, d), of a conductor E and H (n, 3, d, 2); on the sphere too."""
+        if self.boundary != "pec":
+            each = [sphere.total_field(self.k, 1.0, x, d, self.boundary) for d in self.directions]
+            return np.stack(each, axis=1)
+        pairs = [
+            [sphere.pec_total_field(self.k, 1.0, x, d, e) for e in dipoles.frames(d[None])[0]] for d in self.directions
+        ]
+        return tuple(np.stack([np.stack([one[f] for one in both], -1) for both in pairs], 2) for f in range(2))
+
+    def normal_derivative(self, x: FloatArray, _: FloatArray) -> ComplexArray:
+        """du/dn on the sphere (n, d), 1/L."""
+        each = [sphere.surface_derivative(self.k, 1.0, x @ d, self.boundary) for d in self.directions]
+        return np.stack(each, axis=1)
+
+
+def _scalar_ball(k: float, d: FloatArray, r: FloatArray, boundary: Any) -> ComplexArray:
+    return sphere.far_field(k, 1.0, r @ d, boundary)
+
+
+def conducting_ball(k: float, d: FloatArray, r: FloatArray, boundary: Any = "pec") -> ComplexArray:
+    """Far field of the unit ball, theta and phi scattered by theta and phi incident: (3,), (m, 3) -> (m, 2, 2)."""
+    across = np.cross(r, d)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    before, after = dipoles.frames(d[None])[0], dipoles.frames(r)
+    total = np.zeros((len(r), 2, 2), dtype=complex)
+    # across and in the plane of scattering, as `tests.reference.sphere` has them
+    for amplitude, e, s in zip(
+        sphere.pec_far_field(k, 1.0, r @ d),
+        (across, np.cross(across, d)),
+        (across, np.cross(across, r)),
+        strict=True,
+    ):
+        total += amplitude[:, None, None] * np.einsum("moc,mc->mo", after, s)[:, :, None] * (e @ before.T)[:, None]
+    return total
+
+
+DEPTHS = {"triaxial": 0.2, "slender": 0.15, "flat": 0.2, "egg": 0.2, "torus": 0.2}
+"""Depths of a conductor's dipoles, L, where they differ from those of the scalar sources."""
+
+
+def reference_of(name: str, k: float, boundary: Any, incidences: FloatArray) -> Any:
+    """Fields of a body for incidences (d, 3): by series, dipoles or fundamental solutions, 6 or 8 a wavelength."""
+    if name == "sphere":
+        return Ball(k, incidences, boundary)
+    _, body, depth = bodies()[name]
+    dense = 8.0 if k < 20 else 6.0
+    if boundary == "pec":
+        return dipoles.scatter(body, k, incidences, depth=DEPTHS.get(name, depth), per_wavelength=dense)
+    return fundamental.scatter(body, k, incidences, boundary, depth=depth, per_wavelength=dense)
+
+
+def kind_of(boundary: Any) -> Any:
+    """A boundary as creeping takes it, of one that is an admittance too."""
+    return boundary if isinstance(boundary, str) else cr.ImpedanceBoundary(boundary)
+
+
+def rms(values: Any) -> float:
+    """Root mean square of absolute values, NaN of none."""
+    return float(np.sqrt(np.mean(np.abs(values) ** 2))) if np.size(values) else float("nan")
 
 
 def random_directions(rng: np.random.Generator, count: int) -> FloatArray:

@@ -27,58 +27,12 @@ from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.errors import SingularIncidenceError
 from creeping.field.body_currents import cached_currents
 from creeping.rays.fan import RayFan
-from studies import tables
-from studies.accuracy.bodies import DIPOLE_DEPTHS, bodies, random_directions
-from studies.tables import Row
-from tests.reference import dipoles, fundamental, sphere
+from studies import Row, main
+from studies.accuracy.bodies import bodies, kind_of, random_directions, reference_of, rms
 
 WAVENUMBERS = (8.0, 14.0, 24.0)
 BOUNDARIES: tuple[Any, ...] = ("soft", "hard", 0.7, "pec")
 INCIDENCES = 3
-OFF, ALARM = 0.03, 0.01
-
-
-def exact_fields(
-    name: str, k: float, boundary: Any, incidences: FloatArray, r: FloatArray
-) -> tuple[ComplexArray, FloatArray]:
-    """Far fields (d, m), of a conductor (d, m, 2, 2), by a body's reference, and residuals (d,), shares of the wave.
-
-    ``r`` (d, m, 3) are the directions of each incidence.
-    """
-    if name == "sphere":
-        ball = conducting_ball if boundary == "pec" else _scalar_ball
-        return np.stack([ball(k, d, s, boundary) for d, s in zip(incidences, r, strict=True)]), np.zeros(len(r))
-    _, body, depth = bodies()[name]
-    solution: Any
-    if boundary == "pec":
-        dense = 7.0 if k < 20 else 5.0
-        solution = dipoles.scatter(body, k, incidences, depth=DIPOLE_DEPTHS[name], per_wavelength=dense)
-    else:
-        dense = 8.0 if k < 20 else 6.0
-        solution = fundamental.scatter(body, k, incidences, boundary, depth=depth, per_wavelength=dense)
-    fields = np.stack([solution.far_field(s)[:, i] for i, s in enumerate(r)])
-    return fields, solution.residual.reshape(len(r), -1).max(axis=1)
-
-
-def _scalar_ball(k: float, d: FloatArray, r: FloatArray, boundary: Any) -> ComplexArray:
-    return sphere.far_field(k, 1.0, r @ d, boundary)
-
-
-def conducting_ball(k: float, d: FloatArray, r: FloatArray, boundary: Any = "pec") -> ComplexArray:
-    """Far field of the unit ball, theta and phi scattered by theta and phi incident: (3,), (m, 3) -> (m, 2, 2)."""
-    across = np.cross(r, d)
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    before, after = dipoles.frames(d[None])[0], dipoles.frames(r)
-    total = np.zeros((len(r), 2, 2), dtype=complex)
-    # across and in the plane of scattering, as `tests.reference.sphere` has them
-    for amplitude, e, s in zip(
-        sphere.pec_far_field(k, 1.0, r @ d),
-        (across, np.cross(across, d)),
-        (across, np.cross(across, r)),
-        strict=True,
-    ):
-        total += amplitude[:, None, None] * np.einsum("moc,mc->mo", after, s)[:, :, None] * (e @ before.T)[:, None]
-    return total
 
 
 @cache
@@ -91,7 +45,9 @@ def rows(name: str, k: float, boundary: Any, seed: int) -> list[Row]:
         ahead = d + 2 / k * rng.normal(size=(100, 3))
         drawn.append((d, np.concatenate([r, ahead / np.linalg.norm(ahead, axis=1, keepdims=True)])))
     incidences, observers = (np.stack(each) for each in zip(*drawn, strict=True))
-    exact, residual = exact_fields(name, k, boundary, incidences, observers)
+    solution = reference_of(name, k, boundary, incidences)
+    exact = np.stack([solution.far_field(r)[:, i] for i, r in enumerate(observers)])
+    residual = solution.residual.reshape(INCIDENCES, -1).max(axis=1)
     found = (_columns(name, k, boundary, *one) for one in zip(incidences, observers, exact, residual, strict=True))
     return [columns for columns in found if columns is not None]
 
@@ -107,7 +63,7 @@ def _columns(
     name: str, k: float, boundary: Any, d: FloatArray, r: FloatArray, exact: ComplexArray, residual: float
 ) -> Row | None:
     """The columns for one incidence; None where it is singular."""
-    kind: Any = boundary if isinstance(boundary, str) else cr.ImpedanceBoundary(boundary)
+    kind = kind_of(boundary)
     try:
         fan = _fan(name, tuple(d))
     except SingularIncidenceError:
@@ -116,27 +72,23 @@ def _columns(
     rays = cr.far_field(fan, r, wavenumber=k, boundary=kind, method="rays").total
     off, largest = np.abs(far.total - exact), np.abs(exact).max()
     flagged = far.unresolved.reshape(-1, *[1] * (off.ndim - 1))
-    covered = off <= far.error + residual * _rms(exact)
-    bad = off > OFF * largest
+    covered = off <= far.error + residual * rms(exact)
+    bad = off > 0.03 * largest
     shares = {
         "cover": covered[:500],
         "ahead": covered[500:],
         "off": bad,
-        "rays off": np.abs(rays - exact) > OFF * largest,
+        "rays off": np.abs(rays - exact) > 0.03 * largest,
         "silent": bad & ~covered & ~flagged,
-        "false": flagged & (off < ALARM * largest),
+        "false": flagged & (off < 0.01 * largest),
     }
     return {
         "ext": 100 * cached_currents(fan, k, kind).extinction,
-        "true": 100 * _rms(off[:500]) / _rms(exact[:500]),
+        "true": 100 * rms(off[:500]) / rms(exact[:500]),
         "ratio": float(np.median(far.error / off)),
         **{key: 100 * float(np.mean(share)) for key, share in shares.items()},
         "residual": 100 * float(residual),
     }
-
-
-def _rms(values: ComplexArray | FloatArray) -> float:
-    return float(np.sqrt(np.mean(np.abs(values) ** 2)))
 
 
 def _cases(wavenumbers: tuple[float, ...]) -> Iterator[tuple[str, Any, float, list[Row]]]:
@@ -170,4 +122,4 @@ def together(wavenumbers: tuple[float, ...] = WAVENUMBERS) -> Iterator[Row]:
 
 if __name__ == "__main__":
     quick = {"wavenumbers": WAVENUMBERS[:1]}
-    tables.main((coverage, together), {"coverage": quick, "together": quick})
+    main((coverage, together), {"coverage": quick, "together": quick})

@@ -22,15 +22,13 @@ from creeping._typing import FloatArray, IntArray
 from creeping.geodesics.bundle import project_bundle, random_bundle_points
 from creeping.geodesics.states import pack
 from creeping.geometry.surface import normal, project
-from studies import tables
-from studies.tables import Row
+from studies import Row, main
+from studies.accuracy.bodies import rms
 from tests.exact_meshes import on_body, scattered, slivers
 
 POINTS, RAYS, LENGTH = 3000, 60, 2.0
 NAMES = ("ellipsoid", "torus", "twisted")
 COUNTS = (2000, 10_000, 40_000)
-TRACED, CARRIED = 200, 4096
-"""Rays of the mesh tracer and of the fitted body."""
 
 
 def mesh_body(points: FloatArray, triangles: IntArray, **options: Any) -> Any:
@@ -51,11 +49,11 @@ def errors(exact: Any, body: Any, seed: int = 3) -> dict[str, float]:
     ends = [cr.DirectFlow(one, rtol=1e-11).transport(pack(a, b, lanes=12), times)[:, -1] for one, a, b in starts]
     convex = np.isinf(ends[0][:, 11]) & np.isinf(ends[1][:, 11])
     return {
-        "position": _rms(np.linalg.norm(x - y, axis=1)),
-        "normal": _rms(np.linalg.norm(normal(exact, x) - normal(body, y), axis=1)),
-        "kappa_n": _rms(kappa[0] - kappa[1]),
+        "position": rms(np.linalg.norm(x - y, axis=1)),
+        "normal": rms(np.linalg.norm(normal(exact, x) - normal(body, y), axis=1)),
+        "kappa_n": rms(kappa[0] - kappa[1]),
         "geodesic": float(np.median(np.linalg.norm(ends[0][:, :3] - ends[1][:, :3], axis=1))),
-        "attenuation": _rms((ends[0][:, 10] - ends[1][:, 10])[convex]),
+        "attenuation": rms((ends[0][:, 10] - ends[1][:, 10])[convex]),
     }
 
 
@@ -97,11 +95,12 @@ def geodesics(names: tuple[str, ...] = NAMES, counts: tuple[int, ...] = COUNTS) 
     for name in names:
         for count in counts:
             exact, points, triangles = on_body(name, count)
-            starts, p = _starts(exact, points, CARRIED)
+            starts, p = _starts(exact, points, 4096)
             ends, _ = cr.trace(exact, points[starts], p, LENGTH, rtol=1e-12)
             row: Row = {"body": name, "vertices": len(points)}
             row |= _fitted(points, triangles, points[starts], p, ends)
-            row |= _unfolded(points, triangles, starts[:TRACED], p[:TRACED], ends[:TRACED])
+            # fewer: it takes as long
+            row |= _unfolded(points, triangles, starts[:200], p[:200], ends[:200])
             yield row
 
 
@@ -144,12 +143,8 @@ def _errors(name: str, difference: FloatArray) -> Row:
     return {f"{name} median": float(np.median(distance)), f"{name} 95 %": float(np.quantile(distance, 0.95))}
 
 
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(np.abs(values) ** 2))) if values.size else float("nan")
-
-
 if __name__ == "__main__":
-    tables.main(
+    main(
         (even, awkward, geodesics),
         {"even": {"counts": COUNTS[:2]}, "awkward": {"count": 2000}, "geodesics": {"counts": COUNTS[:1]}},
     )

@@ -28,14 +28,10 @@ from creeping.errors import SingularIncidenceError
 from creeping.geometry.quadrature import body_nodes
 from creeping.rays.fan import RayFan
 from creeping.shadow.attachment import occluded
-from studies import tables
-from studies.accuracy.bodies import DIPOLE_DEPTHS, bodies, random_directions
-from studies.tables import Row
-from tests.reference import dipoles, fundamental, sphere
+from studies import Row, main
+from studies.accuracy.bodies import bodies, kind_of, random_directions, reference_of
 
 BODIES = ("sphere", "triaxial", "slender", "flat", "egg", "twisted", "peanut")
-BOUNDARIES: tuple[Any, ...] = ("soft", "hard", 0.7)
-HEIGHTS = (0.03, 3.0)
 Part = tuple[FloatArray, Any, BoolArray, float]
 """True errors, what states them, which of them belong to the part, and the unit of the error."""
 
@@ -58,7 +54,7 @@ def places(name: str, d: FloatArray, rng: np.random.Generator) -> tuple[FloatArr
     nodes = body_nodes(body, 20.0)
     pick = rng.choice(len(nodes.points), 700, p=nodes.weights / nodes.weights.sum())
     on, normals = nodes.points[pick], nodes.normals[pick]
-    height = np.exp(rng.uniform(np.log(HEIGHTS[0]), np.log(HEIGHTS[1]), 600))
+    height = np.exp(rng.uniform(np.log(0.03), np.log(3.0), 600))
     off = on[:600] + height[:, None] * normals[:600]
     axis = rng.uniform(1.1, 4.0, 100)[:, None] * d + 0.1 * rng.normal(size=(100, 3))
     points = np.concatenate([off, axis])
@@ -125,39 +121,26 @@ def _scalar(
     name: str, k: float, boundary: Any, fan: RayFan, points: FloatArray, on: FloatArray, normals: FloatArray, lit: Any
 ) -> tuple[FloatArray, Any, Any, dict[str, Part], float]:
     """True errors off the body, the fields off it and on it, parts on it, and the reference's residual."""
-    d, soft = fan.line.direction, boundary == "soft"
-    if name == "sphere":
-        of_surface = sphere.surface_derivative if soft else sphere.surface_field
-        exact, there = sphere.total_field(k, 1.0, points, d, boundary), of_surface(k, 1.0, on @ d, boundary)
-        residual = 0.0
-    else:
-        _, body, depth = bodies()[name]
-        solution = fundamental.scatter(body, k, d[None], boundary, depth=depth, per_wavelength=8.0 if k < 15 else 6.0)
-        exact = solution.total(points)[:, 0]
-        there = (solution.normal_derivative(on, normals) if soft else solution.total(on))[:, 0]
-        residual = float(solution.residual[0])
-    kind: Any = boundary if isinstance(boundary, str) else cr.ImpedanceBoundary(boundary)
+    solution, kind, soft = (
+        reference_of(name, k, boundary, fan.line.direction[None]),
+        kind_of(boundary),
+        boundary == "soft",
+    )
+    exact = solution.total(points)[:, 0]
+    there = (solution.normal_derivative(on, normals) if soft else solution.total(on))[:, 0]
     near = cr.near_field(fan, points, wavenumber=k, boundary=kind)
     surface = cr.surface_field(fan, on, wavenumber=k, boundary=kind)
     wrong, unit = np.abs(surface - there), k if soft else 1.0
     parts: dict[str, Part] = {"on lit": (wrong, surface, lit, unit), "dark": (wrong, surface, ~lit, unit)}
-    return np.abs(near - exact), near, surface, parts, residual
+    return np.abs(near - exact), near, surface, parts, float(solution.residual[0])
 
 
 def _conductor(
     name: str, k: float, _: Any, fan: RayFan, points: FloatArray, on: FloatArray, normals: FloatArray, lit: Any
 ) -> tuple[FloatArray, Any, Any, dict[str, Part], float]:
     """The same of E and H, the current and the charge, of both polarisations."""
-    d, both = fan.line.direction, np.concatenate([points, on])
-    if name == "sphere":
-        each = [sphere.pec_total_field(k, 1.0, both, d, e) for e in dipoles.frames(d[None])[0]]
-        E, H = (np.stack(fields, -1) for fields in zip(*each, strict=True))
-        residual = 0.0
-    else:
-        body, depth = bodies()[name][1], DIPOLE_DEPTHS[name]
-        solution = dipoles.scatter(body, k, d[None], depth=depth, per_wavelength=8.0 if k < 15 else 6.0)
-        E, H = (field[:, :, 0] for field in solution.total(both))
-        residual = float(solution.residual.max())
+    solution = reference_of(name, k, "pec", fan.line.direction[None])
+    E, H = (field[:, :, 0] for field in solution.total(np.concatenate([points, on])))
     near, current = cr.conductor_field(fan, points, wavenumber=k), cr.conductor_current(fan, on, wavenumber=k)
     count, of_both = len(points), np.ones(2, bool)
     off = np.maximum(np.linalg.norm(near.E - E[:count], axis=1), np.linalg.norm(near.H - H[:count], axis=1))
@@ -169,7 +152,7 @@ def _conductor(
         "dark": (wrong, current, ~lit[:, None] & of_both, 1.0),
         "charge": (mistaken, of_charge, np.ones(wrong.shape, bool), 1.0),
     }
-    return off, near, current, parts, residual
+    return off, near, current, parts, float(solution.residual.max())
 
 
 def _table(names: Sequence[str], boundaries: Sequence[Any], wavenumbers: Sequence[float]) -> Iterator[Row]:
@@ -196,7 +179,9 @@ def _cells(found: Row) -> Row:
 
 
 def scalar(
-    names: Sequence[str] = BODIES, boundaries: Sequence[Any] = BOUNDARIES, wavenumbers: Sequence[float] = (10, 20, 30)
+    names: Sequence[str] = BODIES,
+    boundaries: Sequence[Any] = ("soft", "hard", 0.7),
+    wavenumbers: Sequence[float] = (10, 20, 30),
 ) -> Iterator[Row]:
     """Soft, hard and eta = 0.7: share covered (stated over true error, true error)."""
     return _table([name for name in names if name != "egg"], boundaries, wavenumbers)
@@ -209,4 +194,4 @@ def conductor(names: Sequence[str] = BODIES, wavenumbers: Sequence[float] = (10,
 
 if __name__ == "__main__":
     quick = {"names": BODIES[:1], "wavenumbers": (10,)}
-    tables.main((scalar, conductor), {"scalar": quick, "conductor": quick})
+    main((scalar, conductor), {"scalar": quick, "conductor": quick})

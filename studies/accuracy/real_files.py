@@ -8,12 +8,12 @@ lost at edges and tips, the largest field and the error of it, how many directio
 Run ``python -m studies real_files FOLDER`` (a minute a file, five at most).
 """
 
-import json
 import re
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -21,10 +21,9 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any
-from studies import tables
-from studies.tables import Row
+from creeping.commands.options import CAD, MESHES
+from studies import Row, main
 
-CAD, MESHES = (".step", ".stp", ".brep", ".iges", ".igs"), (".obj", ".off", ".ply", ".stl")
 OPTIONS: dict[str, Any] = {
     "part": "largest",
     "cap": 1e9,
@@ -34,22 +33,9 @@ OPTIONS: dict[str, Any] = {
     "units": "m",
 }
 """What is taken of an option that a refusal names, in this order."""
-ACROSS = 10.0
-"""Wavelengths across a body."""
-INCIDENT = (1.0, 0.4, 0.7)
-BESIDE = (0.9, 0.5, 0.7)
-"""Another incidence, where the first one is singular."""
-SEEN = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (-0.6, 0.8, 0.0))
-CHILD = """
-import json, pathlib, resource, sys
-from studies.accuracy import real_files
-path, options, limit = sys.argv[1:]
-resource.setrlimit(resource.RLIMIT_CPU, (int(limit), int(limit) + 5))
-print(json.dumps(real_files.far_field_of(pathlib.Path(path), json.loads(options))))
-"""
-ROOT = Path(__file__).parents[2]
-HEADINGS = "file, options, stage, body s, fan s, all s, lost, method, field, error, unresolved, refusal"
-EMPTY: Row = dict.fromkeys(HEADINGS.split(", "), "")
+EMPTY: Row = dict.fromkeys(
+    "file, options, stage, body s, fan s, all s, lost, method, field, error, unresolved, refusal".split(", "), ""
+)
 
 
 def far_field_of(path: Path, options: dict[str, Any]) -> Row:
@@ -59,12 +45,13 @@ def far_field_of(path: Path, options: dict[str, Any]) -> Row:
     try:
         body: Any = (sc.Cad if path.suffix.lower() in CAD else sc.Mesh)(path, cache=False, **options)
         row |= {"body s": time.process_time() - began, "stage": "fan"}
-        k = 2 * np.pi * ACROSS / float(np.linalg.norm(np.ptp(body.bounds, axis=0)))
+        # ten wavelengths across
+        k = 2 * np.pi * 10.0 / float(np.linalg.norm(np.ptp(body.bounds, axis=0)))
         fan = cr.launch(cr.DirectFlow(body), _line(body), wavenumber=k)
         losses = fan.losses()
         row |= {"fan s": time.process_time() - began, "stage": "field"}
         row["lost"] = None if losses is None else [float(share) for share in losses]
-        far = cr.far_field(fan, SEEN, wavenumber=k, boundary="hard")
+        far = cr.far_field(fan, [(1, 0, 0), (0, 1, 0), (0, 0, 1), (-0.6, 0.8, 0)], wavenumber=k, boundary="hard")
     except (ValueError, RuntimeError, MemoryError) as error:
         return row | {"refusal": f"{type(error).__name__}: {error}"}
     largest = int(np.argmax(np.abs(far.total)))
@@ -81,9 +68,9 @@ def far_field_of(path: Path, options: dict[str, Any]) -> Row:
 def _line(body: Any) -> cr.ShadowLine:
     """Shadow line of an incidence, or of another one if that is singular."""
     try:
-        return cr.shadow_line(body, INCIDENT)
+        return cr.shadow_line(body, (1.0, 0.4, 0.7))
     except cr.SingularIncidenceError:
-        return cr.shadow_line(body, BESIDE)
+        return cr.shadow_line(body, (0.9, 0.5, 0.7))
 
 
 def named_option(refusal: str, given: dict[str, Any]) -> dict[str, Any]:
@@ -107,13 +94,14 @@ def followed(path: Path, limit: float) -> list[Row]:
 
 
 def _in_process(path: Path, options: dict[str, Any], limit: float) -> Row:
-    command = [sys.executable, "-c", CHILD, str(path), json.dumps(options), str(int(limit))]
-    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    lines = [line for line in ended.stdout.splitlines() if line.startswith("{")]
-    if lines:
-        row: Row = json.loads(lines[-1])
-        return row
-    return {**EMPTY, "file": path.name, "options": options, "stage": f"ended by {ended.returncode}"}
+    import resource
+
+    most = (resource.RLIMIT_CPU, (int(limit), int(limit) + 5))
+    with ProcessPoolExecutor(1, get_context("spawn"), resource.setrlimit, most) as pool:
+        try:
+            return pool.submit(far_field_of, path, options).result()
+        except BrokenProcessPool:
+            return {**EMPTY, "file": path.name, "options": options, "stage": "ended by the system, or out of time"}
 
 
 def files(where: Path, limit: float = 300.0) -> Iterator[Row]:
@@ -124,4 +112,4 @@ def files(where: Path, limit: float = 300.0) -> Iterator[Row]:
 
 
 if __name__ == "__main__":
-    tables.main((files,), {"files": {"limit": 60.0}}, places=1)
+    main((files,), {"files": {"limit": 60.0}}, places=1)

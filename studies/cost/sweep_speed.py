@@ -1,5 +1,9 @@
 """What do an incidence, a frequency and a value between cost? Lines, rays and fields in bulk, and their errors.
 
+Shadow lines at sweep speed, of 1000 incidences on five bodies: those of the three meshes, the finer ones where needed,
+against (a) the finest mesh for all and (b) the independent `creeping.shadow_line`, panels of exact points, on every
+tenth direction.
+
 Rays are 256 of length 4, with J and attenuation at their ends. Times are processor times on one thread, least of
 several, results in memory; errors of rays are those from the same launch points by order 8 at 1e-12. Maps are built
 beforehand. Run ``python -m studies sweep_speed [--quick] [--tables NAME ...]`` (ten minutes).
@@ -8,6 +12,7 @@ beforehand. Run ``python -m studies sweep_speed [--quick] [--tables NAME ...]`` 
 import time
 from collections.abc import Iterator
 from functools import cache, partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,16 +20,20 @@ import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, FloatArray
 from creeping.geometry.directions import fibonacci_directions, great_circle
+from creeping.geometry.incident import rows_of
 from creeping.phaseflow.tuning.request import tuned_direct
-from creeping.shadow.line import shadow_lines
+from creeping.shadow.arcs import finished
+from creeping.shadow.curves import Curves
+from creeping.shadow.line import TOGETHER, shadow_lines
+from creeping.shadow.meshes import LineMeshes, critical_distances, judged, prepared, traced
+from creeping.shadow.refinement import FORBIDDEN
+from creeping.shadow.status import FOLLOWED, INCIDENCE_STATUSES, NEAR_SINGULAR, OK, SINGULAR, STATUSES
 from creeping.sweeping.request import sweep_request
 from creeping.sweeping.sweeper import Sweeper
-from studies import tables
-from studies.cost.flow_cases import body, seconds_of, threads
-from studies.tables import Row
+from studies import Row, main
+from studies.cost.flow_speed import body, seconds_of, threads
 
 LENGTH, RAYS = 4.0, 256
-REPEATS = 3
 BODIES = ("ellipsoid", "twisted", "torus", "gridded")
 TOLERANCES = (3e-5, 1e-6)
 FIELDS: dict[str, Any] = {
@@ -34,9 +43,7 @@ FIELDS: dict[str, Any] = {
     "n_rays": RAYS,
 }
 """Monostatic fields of a sweep."""
-ACCURACY = 1e-3
-TILTED, SINGULAR = (0.3, 0.5, 0.81), (1.0, 0.0, 0.05)
-"""Axes of cuts: of a general one, and of one that passes through singular directions of the twisted ellipsoid."""
+LINE_BODIES = ("ellipsoid", "torus", "twisted", "peanut", "bumpy")
 
 
 @cache
@@ -82,8 +89,8 @@ def fans(names: tuple[str, ...] = BODIES, count: int = 512, checked: int = 16) -
             for tolerance in TOLERANCES[: 1 if name == "gridded" else None]:
                 flow = flow_of(name, tolerance, direct)
                 sweeper = Sweeper(flow, sweep_request("rays", length=LENGTH, n_rays=n_rays))
-                whole = seconds_of(partial(sweeper, incidences), REPEATS) / n
-                line = seconds_of(partial(_lines, body(name), batches, n_rays), REPEATS) / n
+                whole = seconds_of(partial(sweeper, incidences)) / n
+                line = seconds_of(partial(_lines, body(name), batches, n_rays)) / n
                 row = {"body": name, "flow": "order 8" if direct else "map", "for": tolerance, "per s": 1 / whole}
                 row |= {"line us": 1e6 * line, "rays us": 1e6 * (whole - line)}
                 yield row | errors_of_rays(name, flow, incidences[:: max(1, n // checked)], n_rays)
@@ -104,7 +111,7 @@ def fields(names: tuple[str, ...] = BODIES[:3], count: int = 256) -> Iterator[Ro
         reference: Any = None
         for direct in (True, False):
             sweeper = Sweeper(flow_of(name, TOLERANCES[0], direct), request)
-            seconds = seconds_of(partial(sweeper, incidences), REPEATS) / count
+            seconds = seconds_of(partial(sweeper, incidences)) / count
             found = sweeper(incidences)
             reference = found if direct else reference
             gap = np.abs(found["creeping"] - reference["creeping"]) > 0.1 * np.abs(reference["creeping"])
@@ -115,7 +122,9 @@ def fields(names: tuple[str, ...] = BODIES[:3], count: int = 256) -> Iterator[Ro
 
 def between(tenth: int = 1) -> Iterator[Row]:
     """Sweeps with accuracy=1e-3 beside some of their incidences without: rates, and errors over the median field."""
-    cuts = {"0.1 deg": (3600, TILTED), "0.025 deg": (14_400, TILTED), "singular": (3600, SINGULAR)}
+    # the last passes through singular directions of the twisted ellipsoid
+    tilted = (0.3, 0.5, 0.81)
+    cuts = {"0.1 deg": (3600, tilted), "0.025 deg": (14_400, tilted), "singular": (3600, (1.0, 0.0, 0.05))}
     for name in ("triaxial", "twisted"):
         for case, (count, axis) in cuts.items():
             if name == "twisted" or case != "singular":
@@ -129,7 +138,7 @@ def interpolated(name: str, directions: FloatArray, few: int) -> Row:
     flow = cr.build_phase_map(body(name), tolerance=TOLERANCES[0], length=LENGTH)
     some = np.sort(np.random.default_rng(0).choice(len(directions), min(few, len(directions)), replace=False))
     plain = partial(cr.sweep_directions, flow, directions[some], **FIELDS)
-    quick = partial(cr.sweep_directions, flow, directions, accuracy=ACCURACY, **FIELDS)
+    quick = partial(cr.sweep_directions, flow, directions, accuracy=1e-3, **FIELDS)
     alone, each = seconds_of(plain, 2) / len(some), seconds_of(quick, 2) / len(directions)
     known, found = plain(), quick()
     row = {"computed per s": 1 / alone, "between per s": 1 / each, "ratio": alone / each}
@@ -163,7 +172,115 @@ def frequencies(methods: tuple[Any, ...] = ("currents", "rays")) -> Iterator[Row
             yield {"method": method, "boundary": boundary, "first": spent[0], "further": float(np.median(spent[1:]))}
 
 
+class Lines(NamedTuple):
+    """Lines of n incidences: status, curves, length and shares (n,) and (n, 3), and v."""
+
+    status: Any
+    curves: FloatArray
+    length: FloatArray
+    shares: FloatArray
+    singular_distance: FloatArray
+
+
+def on_mesh(body: Any, directions: FloatArray, tier: int) -> Lines:
+    """Lines on one mesh; none is sought on another or followed."""
+    waves, numbers = rows_of(directions), np.full((len(directions), 5), np.nan)
+    certain = np.zeros(len(directions), dtype=bool)
+    for start in range(0, len(waves), TOGETHER):
+        nodes, sure = traced(body, waves[start : start + TOGETHER], tier)
+        rows = start + np.flatnonzero([one is not None for one in nodes])
+        curves = Curves.of(waves[rows], [one for one in nodes if one is not None])
+        found = finished(body, curves, RAYS)
+        numbers[rows] = np.column_stack([curves.counts, curves.lengths, found.shares])
+        certain[rows] = sure[rows - start] & found.certain
+    v = critical_distances(body, directions)
+    _, status = judged(v, certain, prepared(body).turn(tier), LineMeshes.count - 2)
+    status[v < FORBIDDEN] = SINGULAR
+    return Lines(status, numbers[:, 0], numbers[:, 1], numbers[:, 2:], v)
+
+
+def swept(body: Any, directions: FloatArray) -> Lines:
+    """Lines as a sweep gets them."""
+    found = shadow_lines(body, directions, RAYS)
+    shares = np.stack([found.attached, found.occluded, found.concave], axis=1)
+    return Lines(found.status, found.curves, found.length, shares, found.singular_distance)
+
+
+def independent(body: Any, directions: FloatArray) -> tuple[Lines, float]:
+    """Lines by `shadow_line`, and seconds of each."""
+    n = len(directions)
+    nothing = np.full((n, 6), np.nan)
+    lines = Lines(np.zeros(n, np.int8), nothing[:, 0], nothing[:, 1], nothing[:, 2:5], nothing[:, 5])
+    started = time.process_time()
+    for row, d in enumerate(directions):
+        try:
+            line = cr.shadow_line(body, d)
+        except cr.SingularIncidenceError:
+            lines.status[row] = SINGULAR
+            continue
+        lines.curves[row], lines.length[row] = len(line.curves), line.length
+        lines.shares[row] = [line.fractions[name] for name in STATUSES]
+    return lines, (time.process_time() - started) / n
+
+
+def differences(found: Lines, exact: Lines) -> Row:
+    """Lines that differ in the number of curves, and worst errors: of status OK, and of all (in brackets)."""
+    both = np.isfinite(found.length) & np.isfinite(exact.length) & (exact.status < SINGULAR)
+    certain = both & (found.status == OK)
+    length = np.abs(found.length / np.where(both, exact.length, 1.0) - 1)
+    share = np.abs(found.shares - exact.shares)
+    row: Row = {}
+    for suffix, rows in (("", certain), (", all", both)):
+        row[f"counts differ{suffix}"] = int(np.sum(found.curves[rows] != exact.curves[rows]))
+        row[f"length{suffix}"] = float(np.max(length[rows], initial=0.0))
+        for k, name in enumerate(STATUSES):
+            row[f"{name}{suffix}"] = float(np.max(share[rows, k], initial=0.0))
+    return row | {"compared": int(both.sum())}
+
+
+@cache
+def measured(name: str, count: int, every: int) -> tuple[Row, Row, Row]:
+    """One body: cost and statuses, then errors against the finest mesh and against the independent line."""
+    shape, directions = body(name), fibonacci_directions(count)
+    found = swept(shape, directions)
+    seconds, meshes = (
+        seconds_of(call) / count for call in (partial(swept, shape, directions), partial(on_mesh, shape, directions, 0))
+    )
+    second = int(np.sum(on_mesh(shape, directions, 0).status != OK))
+    third = int(np.sum(on_mesh(shape, directions, 1).status != OK))
+    first: Row = {"body": name, "us a line": 1e6 * seconds, "on the first mesh": 1e6 * meshes}
+    for code in (OK, NEAR_SINGULAR, FOLLOWED, SINGULAR):
+        first[INCIDENCE_STATUSES[code].split(":")[0]] = int(np.sum(found.status == code))
+    least = np.min(found.singular_distance)
+    first |= {"need mesh 2": second, "need mesh 3": third}
+    counts = np.unique(found.curves[np.isfinite(found.curves)]).astype(int)
+    first |= {"curves seen": " ".join(map(str, counts)), "least v": float(least) if np.isfinite(least) else np.nan}
+    exact = on_mesh(shape, directions, 2)
+    # what even the finest mesh is not certain of is no reference
+    exact.length[exact.status == FOLLOWED] = np.nan
+    one_by_one, each = independent(shape, directions[::every])
+    few = Lines(*(values[::every] for values in found))
+    against = {"body": name, "s a line": each, **differences(few, one_by_one)}
+    return first, {"body": name, **differences(found, exact)}, against
+
+
+def lines(names: tuple[str, ...] = LINE_BODIES, count: int = 1000, every: int = 10) -> Iterator[Row]:
+    """Cost of a line (and without following single lines), statuses, meshes and curves of Fibonacci incidences."""
+    return (measured(name, count, every)[0] for name in names)
+
+
+def finest(names: tuple[str, ...] = LINE_BODIES, count: int = 1000, every: int = 10) -> Iterator[Row]:
+    """Against the finest mesh: counts that differ and worst errors, of certain lines and of all."""
+    return (measured(name, count, every)[1] for name in names)
+
+
+def panels(names: tuple[str, ...] = LINE_BODIES, count: int = 1000, every: int = 10) -> Iterator[Row]:
+    """Against shadow_line, some of them: the same."""
+    return (measured(name, count, every)[2] for name in names)
+
+
 QUICK: dict[str, Any] = {
+    **{name: {"count": 100} for name in ("lines", "finest", "panels")},
     "fans": {"count": 64, "checked": 4},
     "fields": {"count": 32},
     "between": {"tenth": 10},
@@ -173,4 +290,4 @@ QUICK: dict[str, Any] = {
 
 if __name__ == "__main__":
     with threads(1):
-        tables.main((fans, fields, between, frequencies), QUICK)
+        main((lines, finest, panels, fans, fields, between, frequencies), QUICK)

@@ -9,6 +9,7 @@ Sources: [KCY20], [J15].
 import csv
 import os
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -16,25 +17,21 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, FloatArray
-from creeping.field.results.echo import Echo
+from creeping.field.results.comparison import Echo
 from creeping.files import read_cut
 from creeping.plotting.pages import COLOURS, EXACT, new_figure
 from creeping.sweeping.echoes import echo_of
-from studies import tables
+from studies import Row, main
 from studies.figures.drawing import plain_ticks
-from studies.tables import Row
 from tests.reference import sphere
 
 AUSTIN = "austin_IA_s7f6_bistatic.csv"
 FREQUENCIES = "Benchmark_Frequency_TS.csv"
 SOUND = 1477.3
 """Speed of sound of Jech's tables, m/s."""
-SMALL, LONG = 0.01, 0.07
-"""Radius of the sphere and of the spheroid's waist, and its half length, m."""
+SMALL = 0.01
+"""Radius of the sphere and of the spheroid's waist, m; its half length is seven times that."""
 BOUNDARIES = {"hard": "Rigid", "soft": "PressureRelease"}
-BANDS = ((0.0, 1.0), (1.0, 2.0), (2.0, 5.0), (5.0, 8.5), (8.5, 12.0), (12.0, 18.0))
-"""Of k times the radius at the waist."""
-STYLES = {"VV": "-", "HH": "--", "hard": "-", "soft": "--"}
 KILOHERTZ = (12.0, 400.0)
 EXACT_LOOK: dict[str, Any] = {"color": EXACT, "lw": 3.0, "alpha": 0.3}
 
@@ -47,7 +44,7 @@ def conducting_sphere(step: float = 0.5) -> Echo:
 
 def target_strengths(shape: str, boundary: str, kilohertz: FloatArray) -> Echo:
     """Backscatter of Jech's sphere, or of the spheroid at broadside."""
-    body = sc.Sphere(SMALL) if shape == "Sphere" else sc.Ellipsoid(LONG, SMALL, SMALL)
+    body = sc.Sphere(SMALL) if shape == "Sphere" else sc.Ellipsoid(0.07, SMALL, SMALL)
     k = np.asarray(cr.wavenumber(1e3 * kilohertz, sound_speed=SOUND))
     ds = cr.backscatter(body, wavenumbers=k, azimuth=90.0, boundary=boundary)  # type: ignore[arg-type]
     return echo_of(ds, "ts", (boundary,), "", sound_speed=SOUND)
@@ -123,7 +120,7 @@ def _picture(
     axes = figure.subplots(4, 1, height_ratios=(1.5, 0.8, 1.2, 1.2))
     low, high = cut.bounds()
     for c, channel in enumerate(cut.channels):
-        look = {"color": COLOURS[c], "ls": STYLES[channel], "lw": 1.1}
+        look = {"color": COLOURS[c], "ls": ("-", "--")[c], "lw": 1.1}
         axes[0].plot(cut.angles, exact[c], label="Mie's series" if c == 0 else "_", **EXACT_LOOK)
         axes[0].fill_between(cut.angles, low[c, :, 0], high[c, :, 0], color=COLOURS[c], alpha=0.2, lw=0)
         axes[0].plot(cut.angles, cut.levels()[c, :, 0], label=channel, **look)
@@ -137,7 +134,7 @@ def _picture(
         for c, boundary in enumerate(BOUNDARIES):
             echo = echoes[shape, boundary]
             bottom, top = (np.maximum(v[0, 0], -80.0) for v in echo.bounds())
-            look = {"color": COLOURS[c], "ls": STYLES[boundary], "lw": 1.1}
+            look = {"color": COLOURS[c], "ls": ("-", "--")[c], "lw": 1.1}
             _reference(ax, shape, boundary, echo, kilohertz, first=c == 0)
             ax.fill_between(kilohertz, bottom, top, color=COLOURS[c], alpha=0.2, lw=0)
             ax.plot(kilohertz, echo.levels()[0, 0], label=boundary, **look)
@@ -188,7 +185,7 @@ def small_bodies(folder: Path) -> Iterator[Row]:
             waist = echo.wavenumbers * SMALL
             # a table of two digits after the point
             within = (given >= low - 0.005) & (given <= high + 0.005)
-            for first, last in BANDS:
+            for first, last in pairwise((0.0, 1.0, 2.0, 5.0, 8.5, 12.0, 18.0)):
                 part = (waist >= first) & (waist < last)
                 if np.any(part):
                     off, stated = (levels - given)[part], (high - levels)[part]
@@ -210,4 +207,4 @@ def _known(folder: Path, name: str) -> Path:
 
 
 if __name__ == "__main__":
-    tables.main((large_sphere, small_bodies), places=1)
+    main((large_sphere, small_bodies), places=1)

@@ -1,15 +1,19 @@
-"""Geodesics from one point, carried by a phase map, and their wavefronts: Figures 3, 4 and 5."""
+"""Charts with their grids, and geodesics from one point with their wavefronts, by phase maps: Figures 2 to 5."""
 
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, FloatArray
+from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.states import pack
+from creeping.phaseflow.splines import Grid
 from creeping.plotting._drawing import View
 from creeping.plotting._strokes import RAY_COLOUR, LevelColours, Stroke, closed
+from creeping.plotting.pages import COLOURS, new_figure
 from studies.figures.drawing import (
     SOURCE_COLOUR,
     add_level_bar,
@@ -31,11 +35,107 @@ FISH_TAIL = 2.75
 CAUSTIC_COLOUR = "#d32f2f"
 W0 = np.array([0.0, 0.6])
 """Source in the stereographic plane."""
+GRID = Grid((16, 16, 64), 3, (False, False))
+FACES = ("$+x$", "$-x$", "$+y$", "$-y$", "$+z$", "$-z$")
+MARKS = ("o", "s") * 3
+"""Of opposite faces, whose colours some readers cannot tell apart."""
 
 
 def view(azimuth: float, elevation: float) -> View:
     """View from angles in degrees."""
     return View(float(np.radians(azimuth)), float(np.radians(elevation)))
+
+
+def nodes() -> FloatArray:
+    """Nodes of all charts on the body: (6, 16, 16, 3), L."""
+    u, v, _ = GRID.axes()
+    uv = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1)
+    return np.stack([chart.point(uv) for chart in ELLIPSOID.atlas.charts])
+
+
+def grid_on_body(ax: Any) -> None:
+    """Draw the nodes that face the reader, and the edges of the unit squares, on 3-D axes."""
+    side = np.linspace(0.0, 1.0, 100)
+    edge = np.stack([side, np.zeros_like(side)], axis=-1)
+    edges = np.concatenate([edge, 1 - edge, np.roll(edge, 1, axis=1), 1 - np.roll(edge, 1, axis=1)])
+    strokes = [
+        Stroke(np.split(chart.point(edges), 4), colour, 1.2)
+        for chart, colour in zip(ELLIPSOID.atlas.charts, COLOURS, strict=True)
+    ]
+    seen_from = view(-52, 26)
+    draw_curves(ELLIPSOID, strokes, ax=ax, view=seen_from)
+    look: dict[str, Any] = {"depthshade": False, "linewidths": 0, "zorder": 20, "clip_on": False}
+    for colour, mark, points in zip(COLOURS, MARKS, nodes(), strict=True):
+        seen = seen_from.visible(ELLIPSOID, points)
+        if seen.any():
+            ax.scatter(*points[seen].T, s=5, color=colour, marker=mark, **look)
+
+
+def grid_in_chart(ax: Any) -> None:
+    """Draw the nodes of chart +x, and those of its neighbours that lie inside its grid, over (u, v)."""
+    u, v, _ = GRID.axes()
+    inside = nodes()
+    s = ELLIPSOID.inverse(inside)
+    front = s[..., 0] > 0.05
+    tangents = s[..., 1:] / np.where(front, s[..., 0], 1.0)[..., None]
+    uv = np.arctan(tangents) / (np.pi / 2) + 0.5
+    front &= np.all((uv > u[0] - 1e-9) & (uv < u[-1] + 1e-9), axis=-1)
+    front[:2] = False
+    ax.plot(*np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2).T, "o", ms=3, mew=0, color=COLOURS[0])
+    for k in range(2, 6):
+        ax.plot(*uv[k][front[k]].T, MARKS[k], ms=3.4, mfc="none", mew=0.6, color=COLOURS[k])
+    ax.plot([0, 1, 1, 0, 0], [0, 0, 1, 1, 0], color=COLOURS[0], lw=1.2)
+    ax.annotate(
+        "",
+        (0.0, -0.33),
+        (u[0], -0.33),
+        arrowprops={"arrowstyle": "<->", "lw": 0.6, "shrinkA": 0, "shrinkB": 0},
+        annotation_clip=False,
+    )
+    ax.text(0.5 * u[0], -0.35, r"$\delta$", ha="center", va="top", fontsize=9)
+    ax.set_aspect("equal")
+    ax.set_xlim(u[0] - 0.03, u[-1] + 0.03)
+    ax.set_ylim(v[0] - 0.03, v[-1] + 0.03)
+    ax.set_xticks([0, 0.5, 1])
+    ax.set_yticks([0, 0.5, 1])
+    plain_ticks(ax)
+    ax.set_xlabel("$u$", fontsize=9, labelpad=1)
+    ax.set_ylabel("$v$", fontsize=9)
+
+
+def six_charts(path: Path, quick: bool) -> dict[str, Any]:
+    """Figure 2: the six-chart grid on the ellipsoid 1.2, 0.8, 0.8, and how far neighbouring charts reach into one.
+
+    Face +-a of the cube over s = (x/1.2, y/0.8, z/0.8), with (a, b, c) cyclic:
+
+        s_b/s_a = tan xi,  s_c/|s_a| = tan eta,   xi = (u - 1/2) pi/2,  eta = (v - 1/2) pi/2
+
+    The unit squares of (u, v) tile the body. Each grid of 16 x 16 nodes has two nodes beyond every edge (h = 1/11,
+    delta = 2/11), so every point finds a chart in which it is two grid points from the edge [YC06b]. The card measures
+    the map of Algorithm 1 [YC06a] on this grid with 64 angles: T0 = 1/8, tau = 2^-10, S = 7, cubic splines.
+    """
+    from matplotlib.lines import Line2D
+
+    flow = cr.build_phase_map(
+        ELLIPSOID, horizon=1 / 8, time_step=2**-10, stages=7, grid=(16, 64), degree=3, method="tower"
+    )
+    time = 4.0
+    x, p = random_bundle_points(ELLIPSOID, 16 if quick else 64, rng=np.random.default_rng(2))
+    error = end_error(flow, x, p, np.concatenate(flow.flow(x, p, time), axis=-1), time)
+    figure = new_figure((7.2, 3.4))
+    left = figure.add_axes((0.01, 0.09, 0.56, 0.83), projection="3d")
+    grid_on_body(left)
+    panel(figure, "a", "nodes of the charts that face the reader", (0.02, 0.94))
+    right = figure.add_axes((0.64, 0.20, 0.345, 0.72))
+    grid_in_chart(right)
+    right.set_title(r"$\bf{b}$  chart $+x$ and neighbours (hollow)", fontsize=9, loc="left")
+    handles = [
+        Line2D([], [], color=colour, marker=mark, ms=4, lw=1.2, label=name)
+        for name, colour, mark in zip(FACES, COLOURS, MARKS, strict=True)
+    ]
+    figure.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.02, 0.0), ncols=6, frameon=False, fontsize=8)
+    figure.savefig(path, dpi=100 if quick else 300)
+    return rays_card(flow, error, time, rays=len(x), algorithm="1", tau=flow.leaps[0].time, S=7)
 
 
 def circles(path: Path, quick: bool) -> dict[str, Any]:
@@ -49,7 +149,6 @@ def circles(path: Path, quick: bool) -> dict[str, Any]:
     on it and cross themselves. M12 is carried along the rays (M12(0) = 0, M12'(0) = 1); its zero is found on the cubic
     between two times. The source is at (0.8, 0.4, 0.45) before scaling by the half-axes, brought to the unit sphere.
     """
-    from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
     source = ELLIPSOID.forward(np.array([0.8, 0.4, 0.45]) / np.linalg.norm([0.8, 0.4, 0.45]))
@@ -68,7 +167,7 @@ def circles(path: Path, quick: bool) -> dict[str, Any]:
     red = Stroke([closed(caustic)], CAUSTIC_COLOUR, 1.4, rank=3)
     near = view(20, 22)
     far = View(near.azimuth + np.pi + 0.15, float(np.radians(-18)))
-    figure = Figure(figsize=(9.6, 3.3), facecolor="white")
+    figure = new_figure((9.6, 3.3))
     for left, strokes, seen in ((0.0, [some, *rings, red], near), (0.31, [*rings, tail, red], far)):
         ax = figure.add_axes((left, 0.08, 0.31, 0.82), projection="3d")
         draw_curves(ELLIPSOID, strokes, ax=ax, view=seen, source=source)
@@ -90,24 +189,13 @@ def circles(path: Path, quick: bool) -> dict[str, Any]:
 
 def first_caustic(states: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
     """First zero of M12 on each ray: points (n, 3) and times (n,), from states (n, m, 10)."""
-    m12 = states[..., 8]
-    before = np.argmax((m12[:, 1:-1] > 0) & (m12[:, 2:] <= 0), axis=1) + 1
-    rows = np.arange(len(states))
-    left, right = states[rows, before], states[rows, before + 1]
-    h = times[before + 1] - times[before]
-
-    def hermite(s: FloatArray, lane: int, rate: int) -> FloatArray:
-        a, b, m0, m1 = left[:, lane], right[:, lane], h * left[:, rate], h * right[:, rate]
-        return np.asarray(a + s * (m0 + s * (3 * (b - a) - 2 * m0 - m1 + s * (2 * (a - b) + m0 + m1))))
-
-    # the zero is simple: bisection on the cubic cannot miss it
-    low, high = np.zeros(len(rows)), np.ones(len(rows))
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        positive = hermite(middle, 8, 9) > 0
-        low, high = np.where(positive, middle, low), np.where(positive, high, middle)
-    points = np.stack([hermite(low, k, k + 3) for k in range(3)], axis=-1)
-    return points, times[before] + low * h
+    points, found = [], []
+    for one in states:
+        zeros = CubicHermiteSpline(times, one[:, 8], one[:, 9]).roots(extrapolate=False)
+        # that of the start left out
+        found.append(zeros[zeros > 0.5 * times[1]][0])
+        points.append(CubicHermiteSpline(times, one[:, :3], one[:, 3:6])(found[-1]))
+    return np.array(points), np.array(found)
 
 
 def fish_tails(
@@ -139,8 +227,6 @@ def torus(path: Path, quick: bool) -> dict[str, Any]:
     rho cos(angle to the parallel) = h is constant along each: rays with h > R - r turn back before the inner equator
     and cross the outer one again and again, the others wind around the tube.
     """
-    from matplotlib.figure import Figure
-
     source, drawn, last, seen = np.array([1.5, 0.0, 0.0]), 64, 3.0, view(-28, 42)
     flow = cr.build_phase_map(TORUS, tolerance=1e-4 if quick else 1e-6)
     p = directions_at(TORUS, source, turn(512 if quick else 2048))
@@ -150,7 +236,7 @@ def torus(path: Path, quick: bool) -> dict[str, Any]:
     chosen = np.arange(4, round(last / STEP) + 1, 4)
     colours = LevelColours(float(times[chosen[0]]), last, "t")
     rings = circle_strokes(points[:, chosen], times[chosen], colours)
-    figure = Figure(figsize=(9.6, 3.7), facecolor="white")
+    figure = new_figure((9.6, 3.7))
     for left, strokes in (
         (0.0, [ray_stroke(TORUS, points, tangents, times, every=len(points) // drawn)]),
         (0.46, rings),
@@ -174,8 +260,6 @@ def weighted(path: Path, quick: bool) -> dict[str, Any]:
 
     Direction is p = dx/dt / |dx/dt|. No ray reaches (-1, 0, 0) in finite time.
     """
-    from matplotlib.figure import Figure
-
     flow = cr.build_phase_map(WEIGHTED, tolerance=1e-4 if quick else 1e-6)
     angles, times, drawn = turn(256 if quick else 512), equal_times(STEP, 3.0), 32
     truth = np.concatenate(exact(angles, times), axis=-1)
@@ -186,7 +270,7 @@ def weighted(path: Path, quick: bool) -> dict[str, Any]:
     off = np.linalg.norm(found - truth, axis=-1)
     levels = times[4::4]
     colours = LevelColours(float(levels[0]), float(times[-1]), "t")
-    figure = Figure(figsize=(7.6, 3.5), facecolor="white")
+    figure = new_figure((7.6, 3.5))
     rays = ray_stroke(WEIGHTED, points, tangents, times, every=len(points) // drawn)
     fronts = circle_strokes(points[:, np.searchsorted(times, levels)], levels, colours)
     ax = figure.add_axes((0.0, 0.03, 0.46, 0.88), projection="3d")

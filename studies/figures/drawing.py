@@ -6,7 +6,7 @@ and of rays at their ends against direct integration.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -19,11 +19,12 @@ from creeping.geometry.piecewise import drawn_mesh
 from creeping.geometry.surface import Surface, size
 from creeping.plotting import pictures, plot_line
 from creeping.plotting._drawing import Drawing, Mark, View, compose
-from creeping.plotting._strokes import ARROW_COLOUR, RAY_COLOUR, LevelColours, Stroke, closed, refined
+from creeping.plotting._strokes import RAY_COLOUR, LevelColours, Stroke, closed, refined
+from creeping.plotting.pages import add_bar
 
 SOURCE_COLOUR = "#c2185b"
-RAY_COUNT, CHECKED_RAYS = 32, 64
-"""Rays of a fan that are drawn, and of a bundle that are traced again."""
+RAY_COUNT = 32
+"""Rays of a fan that are drawn."""
 
 
 @dataclass(frozen=True)
@@ -60,24 +61,10 @@ def draw_curves(
     source : (3,), L, optional
         A point to mark, where it is visible.
     """
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-    scene = Scene(body, np.zeros(3), view, *drawn_mesh(body, 80), list(strokes), LevelColours.of([]))
-    ax.computed_zorder = False
-    pictures._draw_body(ax, scene)
-    for stroke in scene.strokes:
-        pictures._draw_stroke(ax, scene, stroke)
-    ax.add_collection3d(
-        Poly3DCollection([mark.outline(view) for mark in scene.triad], facecolors=ARROW_COLOUR, linewidths=0, zorder=30)
-    )
-    for mark in scene.triad:
-        ax.text(*mark.label(view), mark.name, zorder=30, **mark.text)
+    drawing = Scene(body, None, view, *drawn_mesh(body, 80), list(strokes), LevelColours.of([]))
+    pictures.draw(ax, drawing)
     if source is not None and view.visible(body, np.asarray(source, dtype=float)[None])[0]:
         ax.plot(*np.reshape(source, (3, 1)), "o", ms=4, color=SOURCE_COLOUR, mec="white", mew=0.6, zorder=25)
-    # 3-D axes are square; a wide body may use all of the place they were given
-    for artist in ax.collections:
-        artist.set_clip_on(False)
-    pictures._frame(ax, scene)
 
 
 def directions_at(body: Surface, point: FloatArray, angles: FloatArray) -> FloatArray:
@@ -111,12 +98,9 @@ def circle_strokes(points: FloatArray, levels: FloatArray, colours: LevelColours
 
 def add_level_bar(figure: Any, colours: LevelColours, levels: FloatArray, label: str, **place: Any) -> None:
     """Colour bar with the range of the levels; ``place`` as for ``Figure.colorbar``."""
-    bar = figure.colorbar(colours.mappable, **place)
-    bar.set_label(label, fontsize=8)
-    bar.ax.tick_params(labelsize=8, width=0.5)
+    bar = add_bar(figure, colours.mappable, label, fontsize=8, **place)
     bar.set_ticks(levels[1::2] if len(levels) > 8 else levels)
     bar.ax.hlines(levels, 0, 1, colors="white", linewidth=0.4)
-    bar.outline.set_linewidth(0.5)
 
 
 def plain_ticks(ax: Any, which: Literal["major", "both"] = "major") -> None:
@@ -143,15 +127,8 @@ def in_parameters(ax: Any, fan: cr.RayFan, curves: Sequence[cr.IsoPhaseCurve], u
 
 def add_legend(figure: Any, drawings: Sequence[Drawing]) -> None:
     """One legend under all panels, of whatever any of them shows."""
-    from matplotlib.lines import Line2D
-
     named = {stroke.label: stroke for drawing in drawings for stroke in drawing.strokes if stroke.label}
-    ordered = sorted(named.values(), key=lambda stroke: -stroke.rank)
-    handles = [
-        Line2D([], [], color=stroke.colour, lw=max(stroke.width, 0.9), alpha=stroke.alpha, label=stroke.label)
-        for stroke in ordered
-    ]
-    figure.legend(handles=handles, loc="lower center", ncols=len(handles), frameon=False, fontsize=8)
+    replace(drawings[0], strokes=list(named.values())).add_legend(figure, columns=len(named))
 
 
 def map_card(flow: cr.PhaseMap) -> dict[str, Any]:
@@ -167,7 +144,7 @@ def map_card(flow: cr.PhaseMap) -> dict[str, Any]:
 def end_error(
     flow: cr.PhaseMap, points: FloatArray, directions: FloatArray, ends: FloatArray, time: float
 ) -> cr.ErrorEstimate:
-    """Error of rays at one time, against `trace` at 1e-12.
+    """Error of 64 of the rays at one time, against `trace` at 1e-12.
 
     Parameters
     ----------
@@ -178,7 +155,7 @@ def end_error(
         (x, p) that the map found at the time.
     time : float
     """
-    some = np.unique(np.linspace(0, len(points) - 1, CHECKED_RAYS).astype(int))
+    some = np.unique(np.linspace(0, len(points) - 1, 64).astype(int))
     exact = np.concatenate(cr.trace(flow.body, points[some], directions[some], time, rtol=1e-12), axis=-1)
     error = np.linalg.norm(ends[some] - exact, axis=-1)
     return cr.ErrorEstimate(float(np.sqrt(np.mean(error**2))), float(error.max()), len(some))

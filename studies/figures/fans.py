@@ -9,6 +9,7 @@ import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, FloatArray
 from creeping.plotting._drawing import Drawing
+from creeping.plotting.pages import new_figure
 from studies.figures.drawing import (
     add_legend,
     add_level_bar,
@@ -25,8 +26,6 @@ TWISTED, TORUS = sc.TwistedEllipsoid(a=0.5, b=0.5, c=1.0, d=0.2), sc.Torus(R=1.0
 LENGTH, SPACING = 1.5, 0.25
 """Of rays, and between iso-phase curves."""
 LEVELS = equal_times(SPACING, LENGTH)[1:]
-EARLY = LEVELS[:-1]
-"""Levels that rays of the twisted ellipsoid meet before they have faded by 30 dB at k rho = 10."""
 DISTANCES = (1.05, 1.5, 3.0, 30.0)
 """Of sources from the centre of a sphere, in its radii."""
 HEIGHTS = (0.0, 0.7, 3.0)
@@ -44,24 +43,23 @@ def creeping(path: Path, quick: bool) -> dict[str, Any]:
     get paler every 10 dB (hard, k rho = 10) and end at 30 dB or their second caustic. A
     pole of the angles is the whole edge theta = 0 or 180 degrees: the shadow line of (1, 0, 0) passes through both.
     """
-    from matplotlib.figure import Figure
-
     incidences = ((1, 1, 1), (1, 0, 0))
     flow = cr.build_phase_map(TWISTED, tolerance=1e-4 if quick else 1e-6)
     lines = [cr.shadow_line(TWISTED, d) for d in incidences]
     fans = [cr.launch(flow, line, length=LENGTH, n_rays=64 if quick else 512) for line in lines]
-    figure = Figure(figsize=(7.8, 6.0), facecolor="white")
-    drawings = []
+    figure = new_figure((7.8, 6.0))
+    # levels that rays meet before they have faded by 30 dB at k rho = 10
+    drawings, early = [], LEVELS[:-1]
     for row, (fan, d) in enumerate(zip(fans, incidences, strict=True)):
         bottom = 0.525 - 0.46 * row
         places = (0.0, bottom, 0.36, 0.41), (0.425, bottom + 0.075, 0.455, 0.32)
-        drawings.append(_pair(figure, fan, cr.iso_phase_curves(fan, EARLY), *places, until=None))
+        drawings.append(_pair(figure, fan, cr.iso_phase_curves(fan, early), *places, until=None))
         name = f"$d$ = ({', '.join(map(str, d))})"
         panel(figure, "ac"[row], f"{name}, on the body", (0.01, bottom + 0.425))
         panel(figure, "bd"[row], f"{name}, over the angles", (0.38, bottom + 0.425))
     first = [float(fan.detachment.min()) if np.isfinite(fan.detachment).any() else None for fan in fans]
     told = {"directions": incidences, "launched": "attached", "earliest_detachment": first}
-    return _finished(path, quick, figure, drawings, fans, flow, (0.905, 0.31, 0.016, 0.42), told, EARLY)
+    return _finished(path, quick, figure, drawings, fans, flow, (0.905, 0.31, 0.016, 0.42), told, early)
 
 
 def torus(path: Path, quick: bool) -> dict[str, Any]:
@@ -72,14 +70,12 @@ def torus(path: Path, quick: bool) -> dict[str, Any]:
     ray grazes the body, so no creeping ray starts: on the right only attached points launch. Rays are drawn faint where
     they are detached. (theta, psi) as in x = ((R + r cos theta) cos psi, (R + r cos theta) sin psi, r sin theta).
     """
-    from matplotlib.figure import Figure
-
     launched = {"all": "all of the shadow line launches", "attached": "attached points launch"}
     flow = cr.build_phase_map(TORUS, tolerance=1e-4 if quick else 1e-6)
     line = cr.shadow_line(TORUS, (1, 1, 1))
     asked: dict[str, Any] = {"length": LENGTH, "n_rays": 64 if quick else 768}
     fans = [cr.launch(flow, line, launch_from=status, **asked) for status in launched]
-    figure = Figure(figsize=(8.4, 6.2), facecolor="white")
+    figure = new_figure((8.4, 6.2))
     drawings = []
     for column, (fan, text) in enumerate(zip(fans, launched.values(), strict=True)):
         left = 0.45 * column
@@ -142,9 +138,7 @@ def sources(path: Path, quick: bool) -> dict[str, Any]:
     arccos(a/R_s) from the source, and the front of eikonal sqrt(R_s^2 - a^2) + t the circle t/a behind it. From the
     height h on the axis of a torus both curves are circles: h sin theta - R cos theta = r.
     """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(8.2, 6.4), facecolor="white")
+    figure = new_figure((8.2, 6.4))
     drawings, fans, cards, errors = [], [], {}, {}
     cases: dict[str, tuple[Any, tuple[float, float, float]]] = {
         "twisted ellipsoid": (TWISTED, (0.9, 0.5, 0.9)),

@@ -10,9 +10,8 @@ import creeping as cr
 import scatterers as sc
 from creeping._typing import Any
 from creeping.plotting import decay_picture, far_cut_picture, surface_field_picture
-from creeping.plotting.coloured_body import MeshValues, mesh_picture
-from studies.accuracy.field_bodies import fan_of, surface_errors
-from studies.accuracy.field_sphere import sphere_fan
+from creeping.plotting.pictures import MeshValues, mesh_picture
+from studies.accuracy.field import fan_of, sphere_fan, surface_errors
 from tests.exact_meshes import almond
 from tests.reference import sphere
 

@@ -26,19 +26,13 @@ K = 15.0
 BISTATIC_K = 20.0
 SPAN, BISTATIC_SPAN = 30.0, 50.0
 """Decibels of a colour bar; over the sphere a map has its own, since soft waves fall off by 50 dB more."""
-CHECKED, RAYS = 4, 256
-"""Directions whose field is computed again by the plain route, and rays of each incidence."""
+RAYS = 256
+"""Of each incidence."""
 GREY = "#8a9096"
-RANGE = (5.0, 100.0)
 ROUND = 6.6
 """Of the rays: once round."""
 PANELS = (5.0, 30.0, 100.0)
 """Values of ka at the ends of the panels."""
-TITLES = (
-    "a  backscatter of a conducting sphere over that of geometrical optics",
-    "b  the same at higher frequencies",
-    "c  swing of the beat, and the error of the whole",
-)
 
 
 def cross_section(path: Path, quick: bool) -> dict[str, Any]:
@@ -106,8 +100,8 @@ def unresolved_of(found: Any) -> dict[str, BoolArray]:
 
 
 def agreement(found: Any, flow: Any, length: float) -> dict[str, float]:
-    """Largest differences, dB, to one incidence at a time by `shadow_line`, `launch`, `far_field`, where resolved."""
-    rows = np.linspace(0, found.sizes["incidence"] - 1, CHECKED).astype(int)
+    """Largest differences, dB, to four incidences by `shadow_line`, `launch` and `far_field`, where resolved."""
+    rows = np.linspace(0, found.sizes["incidence"] - 1, 4).astype(int)
     worst: dict[str, float] = dict.fromkeys(BOUNDARIES, 0.0)
     levels, bad = cross_sections(found), unresolved_of(found)
     for row in rows:
@@ -359,7 +353,7 @@ def sphere_rcs(path: Path, quick: bool) -> dict[str, Any]:
     The total is specular reflection plus the wave that has crept round the back; they beat against each other with a
     period of ka near 1.2. Where the peaks stand tells the phase of the creeping wave, how high they are its size.
     """
-    ka = np.arange(RANGE[0], (40.0 if quick else RANGE[1]) + 1e-9, 0.1 if quick else 0.05)
+    ka = np.arange(PANELS[0], (40.0 if quick else PANELS[-1]) + 1e-9, 0.1 if quick else 0.05)
     creeping, total = backscatter(ka)
     exact = exact_backscatter(ka)
     sigma, sigma_exact = 4 * np.abs(total[:, 0, 0]) ** 2, 4 * np.abs(exact) ** 2
@@ -391,6 +385,7 @@ def sphere_rcs(path: Path, quick: bool) -> dict[str, Any]:
 def _beats(path: Path, ka: FloatArray, curves: Any, shares: Any, dpi: int) -> None:
     figure = new_figure((7.2, 6.4))
     axes = figure.subplots(3, 1, gridspec_kw={"hspace": 0.42, "left": 0.1, "right": 0.985, "top": 0.96, "bottom": 0.08})
+    above = "a  backscatter of a conducting sphere over that of geometrical optics", "b  the same at higher frequencies"
     for number, ax in enumerate(axes[:2]):
         part = (ka >= PANELS[number]) & (ka <= PANELS[number + 1])
         for values, name, style in (
@@ -400,7 +395,7 @@ def _beats(path: Path, ka: FloatArray, curves: Any, shares: Any, dpi: int) -> No
             ax.plot(ka[part], values[part], label=name, **style)
         ax.set_xlim(PANELS[number], min(PANELS[number + 1], ka[-1]))
         ax.set_ylabel("σ / (πa²)", fontsize=9)
-        ax.set_title(TITLES[number], fontsize=9, loc="left")
+        ax.set_title(above[number], fontsize=9, loc="left")
     axes[0].legend(loc="upper right", frameon=False, fontsize=8, ncols=2)
     ax = axes[2]
     ax.semilogy(ka, 100 * shares[1], color=COLOURS[0], lw=1.2, label="swing, trough to peak")
@@ -408,7 +403,7 @@ def _beats(path: Path, ka: FloatArray, curves: Any, shares: Any, dpi: int) -> No
     ax.set_xlim(ka[0], ka[-1])
     ax.set_ylim(1e-2, 1e2)
     ax.set_ylabel("per cent of σ", fontsize=9)
-    ax.set_title(TITLES[2], fontsize=9, loc="left")
+    ax.set_title("c  swing of the beat, and the error of the whole", fontsize=9, loc="left")
     ax.legend(loc="upper right", frameon=False, fontsize=8, ncols=2)
     for ax in axes:
         ax.set_xlabel("ka", fontsize=9, labelpad=1)

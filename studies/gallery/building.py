@@ -2,7 +2,9 @@
 
 HTML loads nothing from a network: a built-in theme, fonts of the reader's machine, equations as text.
 
-Also here: markdown of the gallery: a page of each figure from its study and sidecar, and the page that shows them all.
+Also here: markdown of the gallery: a page of each figure from its study and sidecar, and the page that shows them all;
+and pages of the reference: every public name by what one wants to do with it, from the docstrings, by autodoc and
+napoleon.
 """
 
 import inspect
@@ -19,7 +21,6 @@ from typing import Any
 import studies
 from creeping import CreepingError, InvalidInputError
 from creeping._version import __version__
-from studies.gallery.reference import write_reference
 
 PAGES = Path(__file__).parent / "pages"
 NOTEBOOKS = Path(__file__).parent / "notebooks"
@@ -66,6 +67,61 @@ COLUMNS = 3
 LONGEST = 12
 """Numbers of a list that are shown; the sidecar has them all."""
 _CODE = re.compile(r"(``.*?``|`[^`]*`)", re.DOTALL)
+TASKS: dict[str, tuple[str, dict[str, str]]] = {
+    "bodies": (
+        "Bodies",
+        {
+            "scatterers": "Sphere Ellipsoid TwistedEllipsoid Torus Cylinder Cone Capsule ConeSphere Ogive DoubleOgive "
+            "Almond Revolution Implicit Gridded Mesh Cad Facets Bodies examined_mesh ExpressionSpeed Coating",
+            "creeping": "check_surface body_uncertainty BodyUncertainty",
+        },
+    ),
+    "waves": (
+        "Waves and boundaries",
+        {"creeping": "PlaneWave PointSource ImpedanceBoundary wavenumber fibonacci_directions"},
+    ),
+    "rays": (
+        "Shadow lines and creeping rays",
+        {
+            "creeping": "shadow_line ShadowLine launch RayFan RayStatus iso_phase_curves IsoPhaseCurve trace "
+            "ErrorEstimate"
+        },
+    ),
+    "flows": (
+        "Phase maps and other flows",
+        {"creeping": "choose_flow build_phase_map PhaseMap ErrorGrowth load_phase_map DirectFlow"},
+    ),
+    "fields": (
+        "Fields of one incidence",
+        {
+            "creeping": "solve Solution far_field FarField near_field NearField surface_field SurfaceField field_cut "
+            "FieldCut conductor_field ConductorField Fields conductor_current ConductorCurrent surface_currents "
+            "SurfaceCurrents FieldStatus validity Validity far_field_uncertainty compare Comparison"
+        },
+    ),
+    "sweeps": (
+        "Echoes, sweeps and T-matrices",
+        {
+            "creeping": "backscatter bistatic Echo sweep_directions t_matrix t_matrices "
+            "orientation_averages TMatrix impulse_response ImpulseResponse range_profile RangeProfile"
+        },
+    ),
+    "antennas": (
+        "Sources and antennas",
+        {
+            "creeping": "source_pattern SourcePattern coupling Coupling CouplingPaths slot_coupling monopole_coupling "
+            "antenna_coupling port_field PortField"
+        },
+    ),
+    "errors": (
+        "Errors that are raised",
+        {
+            "creeping": "CreepingError InvalidInputError SurfaceError IntegrationError ToleranceError "
+            "SingularIncidenceError StoredMapError"
+        },
+    ),
+}
+"""Title of each page of the reference, and its names by package."""
 
 
 def build_site(
@@ -218,33 +274,30 @@ def figure_page(card: dict[str, Any], docstring: str, path: str, source: str) ->
     """
     fence = "`" * max(3, 1 + max(map(len, re.findall("`+", source)), default=0))
     quick = " --quick" if card["quick"] else ""
-    return "\n".join(
-        [
-            f"# {escaped(card['title'].rstrip('.'))}",
-            "",
-            from_docstring(docstring),
-            "",
-            f"```{{image}} ../figures/{card['file']}",
-            f":alt: {card['title']}",
-            ":width: 100%",
-            "```",
-            "",
-            f"**Measured:** {escaped(card['headline'])}.",
-            "",
-            f"Drawn by `creeping figure {card['name']}{quick} -o out`, version {card['version']}.",
-            "",
-            *numbers(card),
-            "",
-            "## Source",
-            "",
-            f"`{path}`:",
-            "",
-            f"{fence}python",
-            source.rstrip(),
-            fence,
-            "",
-        ]
-    )
+    return f"""\
+# {escaped(card["title"].rstrip("."))}
+
+{from_docstring(docstring)}
+
+```{{image}} ../figures/{card["file"]}
+:alt: {card["title"]}
+:width: 100%
+```
+
+**Measured:** {escaped(card["headline"])}.
+
+Drawn by `creeping figure {card["name"]}{quick} -o out`, version {card["version"]}.
+
+{numbers(card)}
+
+## Source
+
+`{path}`:
+
+{fence}python
+{source.rstrip()}
+{fence}
+"""
 
 
 def gallery_page(cards: list[dict[str, Any]]) -> str:
@@ -257,29 +310,27 @@ def gallery_page(cards: list[dict[str, Any]]) -> str:
         for card in cards
     ]
     cells += [""] * (-len(cells) % COLUMNS)
-    rows = [f"{'  -' if k % COLUMNS else '* -'} {cell}" for k, cell in enumerate(cells)]
-    return "\n".join(
-        [
-            "# Gallery",
-            "",
-            "Each figure is drawn by a function of `studies.figures`, which measures what it shows. Its page gives the",
-            "question, the picture, the numbers of its sidecar, and the source.",
-            "",
-            "```{list-table}",
-            ":class: thumbnails",
-            f":widths: {' '.join(['1'] * COLUMNS)}",
-            "",
-            *rows,
-            "```",
-            "",
-            "```{toctree}",
-            ":hidden:",
-            "",
-            *(f"{short(card['title'])} <{card['name']}>" for card in cards),
-            "```",
-            "",
-        ]
-    )
+    rows = "\n".join(f"{'  -' if k % COLUMNS else '* -'} {cell}" for k, cell in enumerate(cells))
+    pages = "\n".join(f"{short(card['title'])} <{card['name']}>" for card in cards)
+    return f"""\
+# Gallery
+
+Each figure is drawn by a function of `studies.figures`, which measures what it shows. Its page gives the
+question, the picture, the numbers of its sidecar, and the source.
+
+```{{list-table}}
+:class: thumbnails
+:widths: {" ".join(["1"] * COLUMNS)}
+
+{rows}
+```
+
+```{{toctree}}
+:hidden:
+
+{pages}
+```
+"""
 
 
 def short(title: str) -> str:
@@ -309,14 +360,14 @@ def escaped(text: str) -> str:
     return re.sub(r"^(\s*\d*)([-+.)])(?=\s)", r"\1\\\2", "".join(parts), flags=re.MULTILINE)
 
 
-def numbers(card: dict[str, Any]) -> list[str]:
+def numbers(card: dict[str, Any]) -> str:
     """Tables of the parameters and errors of a sidecar, and the seconds."""
     rows = ["## Numbers", ""]
     for title, value in (("Parameters", card["parameters"]), ("Errors", card["error"])):
         rows += [f"| {title} | |", "|---|---|"]
         rows += [f"| {escaped(name)} | {escaped(text)} |" for name, text in flattened(value)]
         rows.append("")
-    return [*rows, f"Drawn in {card['seconds']:g} s."]
+    return "\n".join([*rows, f"Drawn in {card['seconds']:g} s."])
 
 
 def flattened(value: Any, name: str = "") -> list[tuple[str, str]]:
@@ -335,3 +386,25 @@ def _shown(value: Any) -> str:
     if value is None or isinstance(value, bool):
         return {None: "none", True: "yes", False: "no"}[value]
     return str(value)
+
+
+def write_reference(folder: Path) -> None:
+    """Write the pages, and one that lists them, as ``folder/*.md``."""
+    folder.mkdir(parents=True)
+    for name, (title, packages) in TASKS.items():
+        blocks = [
+            f".. {_directive(package, each)}:: {package}.{each}"
+            for package, names in packages.items()
+            for each in names.split()
+        ]
+        text = "\n".join(["```{eval-rst}", *blocks, "```"])
+        (folder / f"{name}.md").write_text(f"# {title}\n\n{text}\n", encoding="utf-8")
+    index = ["# Reference", "", "Every public name, by task.", "", "```{toctree}", *TASKS, "```", ""]
+    (folder / "index.md").write_text("\n".join(index), encoding="utf-8")
+
+
+def _directive(package: str, name: str) -> str:
+    kind = getattr(__import__(package), name)
+    if not isinstance(kind, type):
+        return "autofunction"
+    return "autoexception" if issubclass(kind, Exception) else "autoclass"

@@ -9,7 +9,7 @@ from command_line import ran, table
 
 import creeping as cr
 from creeping.commands import run_field
-from creeping.commands.body import Output
+from creeping.commands.options import Output, WaveOptions
 from creeping.commands.resuming import Unfinished
 from creeping.errors import InvalidInputError
 from creeping.field.waves.forward import lobe_step
@@ -38,7 +38,7 @@ def test_a_frequency_is_in_metres_and_dbsm(tmp_path, capsys):
 
 
 def test_cuts_fit_their_lobes():
-    job = run_field.job(400.0, None, ["cut:30", "cut:0:2", "backscatter"], X)
+    job = run_field.job(WaveOptions(400.0), None, ["cut:30", "cut:0:2", "backscatter"], X)
     fitted = job.fitted(sc.Sphere())
     step = lobe_step(sc.Sphere(), 400.0, monostatic=False)
     # lobes are lambda/D wide: four angles or more to each
@@ -48,9 +48,9 @@ def test_cuts_fit_their_lobes():
     assert np.degrees(fitted.targets[0].phi[0]) == pytest.approx(30)
     for step in ("0", "7", "-1", "0.0001", "x"):
         with pytest.raises(InvalidInputError, match="cut:0"):
-            run_field.job(20.0, None, [f"cut:0:{step}"], X)
+            run_field.job(WaveOptions(20.0), None, [f"cut:0:{step}"], X)
     # of the finest lobes no more than is bearable
-    huge = run_field.job(1e6, None, ["cut:30"], X).fitted(sc.Sphere())
+    huge = run_field.job(WaveOptions(1e6), None, ["cut:30"], X).fitted(sc.Sphere())
     assert len(huge.targets[0].directions) == 7201
 
 
@@ -66,24 +66,25 @@ def test_cuts_fit_their_lobes():
     ],
 )
 def test_the_wave_is_asked_for_once(words, match):
-    asked = {"boundary": None} | words
-    boundary = asked.pop("boundary")
+    asked = {"boundary": None, "polarisation": None} | words
+    boundary, polarisation = asked.pop("boundary"), asked.pop("polarisation")
+    wave = WaveOptions(**asked)
     if match is None:
-        assert run_field.job(None, boundary, None, X, **asked).wavenumber == pytest.approx(cr.wavenumber(10.0))
+        assert run_field.job(wave, boundary, None, X).wavenumber == pytest.approx(cr.wavenumber(10.0))
         return
     with pytest.raises(InvalidInputError, match=match):
-        run_field.job(None, boundary, None, X, **asked)
+        run_field.job(wave, boundary, None, X, polarisation=polarisation)
 
 
 def test_sound_has_its_speed():
-    job = run_field.job(None, "hard", None, X, frequency="38kHz", sound_speed=1477.0)
+    job = run_field.job(WaveOptions(None, "38kHz", None, 1477.0), "hard", None, X)
     assert job.wavenumber == pytest.approx(2 * np.pi * 38e3 / 1477) and job.unit == "m"
     assert job.told("m") == "38 kHz, k = 161.653/m"
 
 
 def test_a_cut_across_the_wave_is_smooth_through_the_poles(tmp_path):
     """At the poles the components are those of the cut, not those of phi = 0."""
-    job = run_field.job(30.0, "pec", ["cut:90"], X)
+    job = run_field.job(WaveOptions(30.0), "pec", ["cut:90"], X)
     body = sc.Sphere()
     fan = cr.launch(cr.DirectFlow(body, rtol=1e-7), cr.shadow_line(body, X), length=3.0, n_rays=32)
     far, _ = job.far_field(fan, Unfinished(tmp_path, tmp_path / "run.parts", {}))
@@ -104,8 +105,8 @@ def test_pictures_have_titles_and_components(tmp_path, monkeypatch):
 
     monkeypatch.setattr("creeping.plotting.far_cut_picture", picture)
     monkeypatch.setattr("creeping.plotting.currents_picture", lambda *_, wave, **__: drawn.update(wave=wave))
-    asked = {"polarisation": "HV,VV", "frequency": "0.5GHz"}
-    job = run_field.job(None, "pec", ["cut:90", "cut:0", "cut:0:20"], X, **asked)
+    wave = WaveOptions(frequency="0.5GHz")
+    job = run_field.job(wave, "pec", ["cut:90", "cut:0", "cut:0:20"], X, polarisation="HV,VV")
     body = sc.Sphere()
     fan = cr.launch(cr.DirectFlow(body, rtol=1e-6), cr.shadow_line(body, X), length=1.0, n_rays=16)
     far, _ = job.far_field(fan, Unfinished(tmp_path, tmp_path / "run.parts", {}))

@@ -8,7 +8,7 @@ import trimesh
 import xarray
 from command_line import creeping, ran, table
 
-from creeping.commands.body import FileOptions, parse_body
+from creeping.commands.options import FileOptions, parse_body
 from creeping.errors import InvalidInputError
 
 

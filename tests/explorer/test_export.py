@@ -8,7 +8,7 @@ import trimesh
 import creeping as cr
 import scatterers as sc
 from creeping.commands import main as cli
-from creeping.commands.body import title_of
+from creeping.commands.options import title_of
 from creeping.explorer.request import ViewRequest
 
 pytest.importorskip("viser")

@@ -18,7 +18,7 @@ from creeping.explorer.frames import (
 )
 from creeping.explorer.panel import _broken, cut_svg, legend, plane_svg, preview_plane_svg, preview_text, refined_text
 from creeping.explorer.request import ViewRequest, far_levels, wave_scale, wave_text
-from creeping.explorer.wave import ENDED, FIELD_COLOURS, field_colours, fitted_span
+from creeping.explorer.scene import ENDED, FIELD_COLOURS, field_colours, fitted_span
 from creeping.geometry.surface import normal
 from creeping.geometry.triangulation import triangulate
 
@@ -155,7 +155,7 @@ def test_waves_that_are_too_long_are_flagged(k, flagged):
 def test_colours_are_of_the_range_and_lines_break_where_an_angle_jumps():
     low, high = RANGE
     colours = field_colours(np.array([np.nan, low - 20, low, high, np.inf]), RANGE)
-    ends = [FIELD_COLOURS.table[n].tolist() for n in (0, 0, 255, 255)]
+    ends = [FIELD_COLOURS[n].tolist() for n in (0, 0, 255, 255)]
     assert colours.tolist() == [list(ENDED), *ends]
     phi = np.radians([150.0, 170.0, 179.0, -170.0, -150.0, np.nan])
     pieces = _broken(np.stack([np.full(6, 1.0), phi], axis=1)[None])

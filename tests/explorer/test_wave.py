@@ -10,7 +10,7 @@ import creeping as cr
 from creeping.explorer.frames import preview_of, refined_view, step_of
 from creeping.explorer.panel import legend, wave_note
 from creeping.explorer.request import ViewRequest
-from creeping.explorer.wave import ENDED, WAVE_COLOURS, strengths, wave_colours
+from creeping.explorer.scene import ENDED, WAVE_COLOURS, coloured, strengths, wave_colours
 from creeping.geometry.triangulation import triangulate
 from creeping.plotting.coloured_body import at_phase
 from tests.patience import until
@@ -55,8 +55,8 @@ def test_colours_are_crests_and_troughs_of_the_range():
     found = strengths(values, levels, SPAN)
     np.testing.assert_allclose(found[:4], [1, -1, 1j, 0])
     assert np.isnan(found[4]) and found[5] == 1
-    crest, trough = WAVE_COLOURS.table[255].tolist(), WAVE_COLOURS.table[0].tolist()
-    middle = WAVE_COLOURS(np.array(0.5)).tolist()
+    crest, trough = WAVE_COLOURS[255].tolist(), WAVE_COLOURS[0].tolist()
+    middle = coloured(WAVE_COLOURS, np.array(0.5)).tolist()
     assert wave_colours(found, 0.0).tolist() == [crest, trough, middle, middle, list(ENDED), crest]
     # a quarter of a period later u = i is up: e^{-i omega t}
     assert wave_colours(found, np.pi / 2)[2].tolist() == crest

@@ -5,7 +5,7 @@ import pytest
 from fake_fields import echo_of
 
 import creeping as cr
-from creeping.field.results.echo import Echo
+from creeping.field.results.comparison import Echo
 
 
 def test_levels():

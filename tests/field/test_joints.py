@@ -8,7 +8,7 @@ import creeping as cr
 from creeping.errors import InvalidInputError
 from creeping.field import routes
 from creeping.field.equation import effort
-from studies.accuracy import joints
+from studies.accuracy import edges
 
 PILL = sc.Capsule(1.0, 4.0)
 
@@ -28,7 +28,7 @@ MOST = {
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "boundary", "theta"), [(*case, 1.0 + 0.2 * n) for n, case in enumerate(MOST)])
 def test_errors_and_what_is_stated(name, boundary, theta):
-    found = joints.row(name, 20.0, boundary if isinstance(boundary, str) else complex(boundary), theta, seed=4)
+    found = edges.joint_row(name, 20.0, boundary if isinstance(boundary, str) else complex(boundary), theta, seed=4)
     for part, most in MOST[name, boundary].items():
         usual, largest, covered = found[part]
         assert largest < most, part
@@ -38,7 +38,7 @@ def test_errors_and_what_is_stated(name, boundary, theta):
 @pytest.mark.slow
 def test_far_field_is_by_the_equation_and_better_than_rays():
     d = np.array([np.sin(1.1), 0, np.cos(1.1)])
-    exact = joints.scatter_by_rings(joints.CASES["capsule 4"][1], 12.0, [1.1], "soft")
+    exact = edges.scatter_by_rings(edges.CASES["capsule 4"][1], 12.0, [1.1], "soft")
     fan = fan_of(PILL, d)
     r = np.random.default_rng(2).normal(size=(60, 3))
     r /= np.linalg.norm(r, axis=1, keepdims=True)
@@ -105,14 +105,14 @@ FROM_NOTHING = [
 @pytest.mark.parametrize(("boundary", "k", "most"), FROM_NOTHING)
 def test_along_the_axis_the_equation_starts_from_nothing(boundary, k, most):
     """The line is a joint: there are no tubes of rays, and no expansion's currents."""
-    profile, fan = joints.CASES["capsule 4"][1], fan_of(PILL, (0, 0, 1), n_rays=16)
-    exact, r = joints.scatter_by_rings(profile, k, [0.0], boundary), np.random.default_rng(5).normal(size=(30, 3))
+    profile, fan = edges.CASES["capsule 4"][1], fan_of(PILL, (0, 0, 1), n_rays=16)
+    exact, r = edges.scatter_by_rings(profile, k, [0.0], boundary), np.random.default_rng(5).normal(size=(30, 3))
     r /= np.linalg.norm(r, axis=1, keepdims=True)
     f = exact.far_field(r)[:, 0]
     far = cr.far_field(fan, r, wavenumber=k, boundary=boundary)
     assert set(far.method) == {"equation"} and np.abs(far.total - f).max() < most * np.abs(f).max()
     assert np.mean(np.abs(far.total - f) <= far.error) > 0.95
-    x, n = joints.spread(profile, np.random.default_rng(6), 30)
+    x, n = edges.spread(profile, np.random.default_rng(6), 30)
     u = cr.surface_field(fan, x, wavenumber=k, boundary=boundary)
     true = (exact.normal_derivative(x, n) if boundary == "soft" else exact.total(x))[:, 0]
     unit = k if boundary == "soft" else 1.0
@@ -146,8 +146,8 @@ def test_a_tip_has_no_value(monkeypatch):
 def test_beams_of_the_other_side_of_a_thin_body_do_not_count():
     """A prolate spheroid met almost along its axis: dark ground all round, thinner than beams reach."""
     body, k, d = sc.Ellipsoid(0.7, 0.7, 2.5), 12.0, np.array([np.sin(0.1), 0, np.cos(0.1)])
-    exact = joints.scatter_by_rings(spheroid(0.7, 2.5), k, [0.1], "hard")
-    x, n = joints.spread(spheroid(0.7, 2.5), np.random.default_rng(3), 200)
+    exact = edges.scatter_by_rings(spheroid(0.7, 2.5), k, [0.1], "hard")
+    x, n = edges.spread(spheroid(0.7, 2.5), np.random.default_rng(3), 200)
     dark = n @ d > 0.1
     u = cr.surface_field(fan_of(body, d), x[dark], wavenumber=k, boundary="hard")
     off = np.abs(u.values - exact.total(x[dark])[:, 0])[u.ok]
@@ -164,4 +164,4 @@ def spheroid(a, c):
         n = np.stack([np.sin(angle) / a, np.cos(angle) / c], axis=-1)
         return np.stack([a * np.sin(angle), c * np.cos(angle)], axis=-1), n / np.linalg.norm(n, axis=-1, keepdims=True)
 
-    return joints.Profile(at, float(s[-1]), (), (), a * a / c)
+    return edges.Profile(at, float(s[-1]), (), (), a * a / c)

@@ -7,7 +7,7 @@ import pytest
 
 import creeping as cr
 from creeping.files import polydata, write_vtp
-from creeping.files.polylines import CELL_ARRAYS, POINT_ARRAYS
+from creeping.files.arrays import CELL_ARRAYS, POINT_ARRAYS
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,8 @@ import pytest
 
 from creeping.errors import CreepingError
 from creeping.files import read_cut, read_ffe
+from creeping.storage.atomic import bytes_of
 from creeping.storage.folder import read_manifest
-from creeping.storage.reading import bytes_of
 from creeping.sweeping.layout import unchanging_digest
 from creeping.sweeping.study import read_study
 from creeping.sweeping.study_tables import _table

@@ -181,6 +181,6 @@ class Specs(Expressions):
 
     def make(self, text: str) -> Any:
         """The body."""
-        from creeping.commands.body import parse_body
+        from creeping.commands.options import parse_body
 
         return parse_body(text, cache=False)

@@ -7,7 +7,7 @@ import creeping as cr
 from creeping.field.waves.far_geometry import fan_strips
 from creeping.rays.shedding import shed_near
 from creeping.shadow.attachment import occluded
-from studies.accuracy import field_bodies as bodies
+from studies.accuracy import field as bodies
 
 pytestmark = pytest.mark.slow
 FACTOR = 1.5

@@ -5,7 +5,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from studies.accuracy import field_sphere
+from studies.accuracy import field as field_sphere
 from tests.reference import sphere
 
 FACTOR = 1.5

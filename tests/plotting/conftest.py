@@ -6,13 +6,12 @@ from creeping.plotting import scene
 
 
 @pytest.fixture
-def fresh_display(monkeypatch, tmp_path):
-    """No verdict in memory, an empty cache folder, no wish in the environment."""
+def fresh_display(monkeypatch):
+    """No verdict in memory, no wish in the environment."""
     monkeypatch.delenv("CREEPING_NO_GL", raising=False)
-    monkeypatch.setattr(scene, "_cache_file", lambda: tmp_path / "cache" / "gl.json")
-    scene._verdict.cache_clear()
-    yield tmp_path / "cache" / "gl.json"
-    scene._verdict.cache_clear()
+    scene._probe.cache_clear()
+    yield
+    scene._probe.cache_clear()
 
 
 @pytest.fixture(scope="session")

@@ -6,8 +6,8 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.errors import InvalidInputError
-from creeping.plotting import currents_picture, decay_picture, field_pictures, surface_field_picture
-from creeping.plotting.field_pictures import levels_of, surface_values
+from creeping.plotting import coloured_body, currents_picture, decay_picture, surface_field_picture
+from creeping.plotting.coloured_body import levels_of, surface_values
 from tests.reference import sphere
 
 K = 30.0
@@ -57,13 +57,13 @@ def test_picture_of_the_body(tmp_path, fan, backend, request):
 @pytest.mark.parametrize("boundary", ["hard", "soft"])
 def test_decay_picture(tmp_path, fan, boundary, monkeypatch):
     drawn = []
-    draw = field_pictures._draw_decay
+    draw = coloured_body._draw_decay
 
     def kept(ax, *rest):
         drawn.append(ax)
         draw(ax, *rest)
 
-    monkeypatch.setattr(field_pictures, "_draw_decay", kept)
+    monkeypatch.setattr(coloured_body, "_draw_decay", kept)
     decay_picture(tmp_path / "a.png", fan, wavenumber=K, boundary=boundary, rays=2, dpi=50)
     assert (tmp_path / "a.png").stat().st_size > 5000
     curves = [line for line in drawn[0].lines if str(line.get_label()).startswith("ray")]
@@ -109,10 +109,10 @@ def test_picture_of_the_currents(tmp_path, fan, boundary):
 
 def test_currents_between_nodes(fan):
     # those of the sphere, 2 |n.d| h and the like, and none beyond the rays
-    from creeping.plotting.coloured_body import _magnitudes
+    from creeping.plotting.coloured_body import current_levels
 
     currents = cr.surface_currents(fan, wavenumber=K, boundary="hard")
-    found = _magnitudes(currents, at([5.0, 60.0, 95.0]), None)
+    found = 10 ** (current_levels(currents, at([5.0, 60.0, 95.0])) / 20)
     np.testing.assert_allclose(
         found, np.abs(sphere.surface_field(K, 1.0, -np.cos(np.radians([5.0, 60.0, 95.0])), "hard")), rtol=0.03
     )

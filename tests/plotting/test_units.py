@@ -5,9 +5,8 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.files import write_csv
-from creeping.plotting import _strokes, coloured_body, field_pictures, line_plots, pages
-from creeping.plotting.coloured_body import currents_picture
-from creeping.plotting.field_pictures import decay_picture, surface_field_picture
+from creeping.plotting import _strokes, coloured_body, line_plots, pages
+from creeping.plotting.coloured_body import currents_picture, decay_picture, surface_field_picture
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +24,7 @@ def test_words(fan):
 
 def test_pictures_say_metres(fan, monkeypatch, tmp_path):
     curves = cr.iso_phase_curves(fan, [0.5, 1.0])
-    assert _strokes.LevelColours.of(curves).words(0.5) == "travel time = 0.5 m"
+    assert _strokes.LevelColours.of(curves[:1]).label(True) == "travel time = 0.5 m"
     ax = line_plots.plot_line(fan.line, fan=fan, curves=curves)
     labels = [one.get_ylabel() for one in (*ax.figure.axes, *ax.child_axes)]
     assert "iso-phase curves: travel time (m)" in labels
@@ -34,8 +33,7 @@ def test_pictures_say_metres(fan, monkeypatch, tmp_path):
     decay_picture(tmp_path / "a.png", fan, wavenumber=12.0, boundary="hard")
     assert drawn[0].get_xlabel() == "arclength from the shadow line (m)"
     assert drawn[0].get_title() == "Field of single rays, k = 12/m, hard boundary"
-    for module in (field_pictures, coloured_body):
-        monkeypatch.setattr(module, "save_painted", lambda *_, label, **__: said.append(label) or "matplotlib")
+    monkeypatch.setattr(coloured_body, "save_painted", lambda *_, label, **__: said.append(label) or "matplotlib")
     asked = {"wavenumber": 12.0, "boundary": "hard", "cells": 12, "backend": "matplotlib"}
     surface_field_picture(tmp_path / "a.png", fan, **asked)
     surface_field_picture(tmp_path / "b.png", fan, wave="38 kHz", **asked)

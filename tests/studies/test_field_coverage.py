@@ -5,6 +5,7 @@ import pytest
 import shared_bodies as sc
 from body_checks import directions
 
+from studies.accuracy import bodies
 from studies.accuracy import field_coverage as coverage
 from tests.reference import clouds, dipoles
 
@@ -13,7 +14,7 @@ def test_the_frames_of_the_conducting_ball(rng):
     d, r = directions(rng, 1)[0], directions(rng, 20)
     solution = dipoles.scatter(clouds.ellipsoid(1, 1, 1), 3.0, d, depth=0.3)
     assert solution.residual.max() < 1e-3
-    np.testing.assert_allclose(coverage.conducting_ball(3.0, d, r), solution.far_field(r)[:, 0], atol=2e-3)
+    np.testing.assert_allclose(bodies.conducting_ball(3.0, d, r), solution.far_field(r)[:, 0], atol=2e-3)
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,12 @@
 import numpy as np
 from tolerances import FRACTION, LINE_LENGTH
 
-from studies.cost import sweep_lines, sweep_speed
+from studies.cost import sweep_speed
 from studies.figures import sweeps
 
 
 def test_lines_agree_with_both_references():
-    tables = (sweep_lines.lines, sweep_lines.finest, sweep_lines.panels)
+    tables = (sweep_speed.lines, sweep_speed.finest, sweep_speed.panels)
     (cost,), (finest,), (panels,) = (table(("peanut",), count=60, every=10) for table in tables)
     assert cost["ok"] + cost["near singular"] + cost["followed one by one"] == 60
     assert cost["need mesh 3"] <= cost["need mesh 2"] < 30
@@ -18,7 +18,7 @@ def test_lines_agree_with_both_references():
         assert row["counts differ"] == 0
         # a sweep promises the length to 2e-6 at worst, and reaches what the tests ask elsewhere
         assert row["length"] < 10 * LINE_LENGTH
-        assert max(row[share] for share in sweep_lines.SHARES) < 10 * FRACTION
+        assert max(row[share] for share in sweep_speed.STATUSES) < 10 * FRACTION
 
 
 def test_fans_carry_their_errors():

@@ -62,7 +62,7 @@ class PortField(PointField):
 
     def to_xarray(self) -> xarray.Dataset:
         """``xarray.Dataset`` of values, error and status, one row per point."""
-        return point_dataset(self, ()).assign_attrs(source=self.source.tolist())
+        return point_dataset(self, {"total": self.values}).assign_attrs(source=self.source.tolist())
 
 
 def port_field(

@@ -13,7 +13,7 @@ import numpy as np
 
 from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.field.results.labelled import ArrayResult
-from creeping.field.results.point_result import PointData, PointValues, by_polarisation, stated, vector_dataset
+from creeping.field.results.point_result import PointData, PointValues, by_polarisation, point_dataset, stated
 
 if TYPE_CHECKING:
     import xarray
@@ -103,7 +103,7 @@ class ConductorField(PointData):
     def to_xarray(self) -> xarray.Dataset:
         """``xarray.Dataset`` of E, H, their parts, error and status, by point, component and polarisation."""
         parts = {f"{letter}_{name}": getattr(getattr(self, name), letter) for name in PARTS for letter in "EH"}
-        return vector_dataset(self, {"E": self.E, "H": self.H, **parts})
+        return point_dataset(self, {"E": self.E, "H": self.H, **parts})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -164,7 +164,7 @@ class ConductorCurrent(ArrayResult, PointData):
     def to_xarray(self) -> xarray.Dataset:
         """``xarray.Dataset`` of J, its parts, charge, error and status, by point and component."""
         parts = {"J": self.values, "charge": self.charge, "lit": self.lit, "creeping": self.creeping}
-        return vector_dataset(self, parts | {"charge_error": self.charge_error})
+        return point_dataset(self, parts | {"charge_error": self.charge_error})
 
 
 def vector_near(

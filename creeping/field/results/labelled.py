@@ -10,7 +10,7 @@ Nothing writes into a result.
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -88,14 +88,12 @@ def directed(directions: FloatArray, wavenumber: float, unit: str) -> dict[str, 
     }
 
 
-def _of_values(name: str) -> Callable[..., Any]:
-    """Method of that name of the values."""
-
-    def method(self: ArrayResult, *args: Any, **options: Any) -> Any:
-        return getattr(self.values, name)(*args, **options)
-
-    method.__name__, method.__doc__ = name, f"Apply `numpy.ndarray.{name}` to the values."
-    return method
+OF_VALUES = frozenset(
+    "T all any argmax argmin argsort astype conj conjugate copy cumsum diagonal dot dtype flatten imag item max mean "
+    "min ndim nonzero prod ravel real repeat reshape round shape size squeeze std sum swapaxes take tolist transpose "
+    "var".split()
+)
+"""Attributes and methods of arrays that results have too; none of them writes."""
 
 
 def _not_in_place(self: ArrayResult, other: Any) -> Any:
@@ -143,47 +141,15 @@ class ArrayResult(NDArrayOperatorsMixin):
         """A single value."""
         return complex(self.values.item())
 
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Shape of the values."""
-        return self.values.shape
+    def __getattr__(self, name: str) -> Any:
+        """Attribute or method of the values."""
+        if name in OF_VALUES:
+            return getattr(self.values, name)
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
-    @property
-    def ndim(self) -> int:
-        """Number of axes of the values."""
-        return self.values.ndim
-
-    @property
-    def size(self) -> int:
-        """Number of values."""
-        return self.values.size
-
-    @property
-    def dtype(self) -> np.dtype[Any]:
-        """Type of the values."""
-        return self.values.dtype
-
-    @property
-    def real(self) -> FloatArray:
-        """Real parts of the values."""
-        return self.values.real
-
-    @property
-    def imag(self) -> FloatArray:
-        """Imaginary parts."""
-        return self.values.imag
-
-    @property
-    def T(self) -> ComplexArray:  # noqa: N802
-        """Values, transposed."""
-        return self.values.T
-
-    all, any, argmax, argmin, argsort, astype = map(_of_values, ("all", "any", "argmax", "argmin", "argsort", "astype"))
-    conj, conjugate, copy, cumsum, diagonal = map(_of_values, ("conj", "conjugate", "copy", "cumsum", "diagonal"))
-    dot, flatten, item, max, mean, min = map(_of_values, ("dot", "flatten", "item", "max", "mean", "min"))
-    nonzero, prod, ravel, repeat, reshape = map(_of_values, ("nonzero", "prod", "ravel", "repeat", "reshape"))
-    round, squeeze, std, sum, swapaxes = map(_of_values, ("round", "squeeze", "std", "sum", "swapaxes"))
-    take, tolist, transpose, var = map(_of_values, ("take", "tolist", "transpose", "var"))
+    def __dir__(self) -> list[str]:
+        """Names with those of the values."""
+        return sorted({*super().__dir__(), *OF_VALUES})
 
     __iadd__ = __isub__ = __imul__ = __itruediv__ = __ipow__ = __imatmul__ = _not_in_place
     __ifloordiv__ = __imod__ = __iand__ = __ior__ = __ixor__ = __ilshift__ = __irshift__ = _not_in_place

@@ -192,7 +192,7 @@ class PointField(ArrayResult, PointData):
     def to_xarray(self) -> xarray.Dataset:
         """``xarray.Dataset`` of values, parts, error and status, one row per point."""
         own = {f.name for f in fields(self)} - {f.name for f in fields(PointField)}
-        return point_dataset(self, tuple(sorted(own)))
+        return point_dataset(self, {"total": self.values} | {name: getattr(self, name) for name in sorted(own)})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -370,13 +370,6 @@ def scalar_on_body(field: PointValues, points: FloatArray, unit: float, facts: d
     return SurfaceField(values=values, lit=lit, creeping=creeping, **stated([field], points, unit), **facts)
 
 
-def zero_field(count: int, method: str) -> PointValues:
-    """The field 0, exactly: u on a soft body."""
-    nothing = np.zeros(count, dtype=complex)
-    status = np.full(count, int(FieldStatus.OK), dtype=np.int64)
-    return PointValues(nothing, nothing, np.zeros(count), np.full(count, "expansion"), status, np.full(count, method))
-
-
 def measured_field(
     values: ComplexArray, error: FloatArray, method: str, error_by: str = "extinction", lit: BoolArray | None = None
 ) -> PointValues:
@@ -398,42 +391,27 @@ def measured_field(
     )
 
 
-def point_dataset(field: PointField, parts: tuple[str, ...]) -> xarray.Dataset:
-    """A field at points with its parts, error and status, one row a point: see `PointField.to_xarray`."""
-    variables: dict[str, Any] = {"total": (("point",), field.values.reshape(-1), {"units": field.unit})}
-    for name in parts:
-        variables[name] = (("point",), np.reshape(getattr(field, name), -1), {"units": field.unit})
-    return _of_points(field, variables, ("point",), {})
-
-
-def vector_dataset(field: PointData, vectors: dict[str, ComplexArray | FloatArray]) -> xarray.Dataset:
-    """Vectors (..., 3) or (..., 3, 2) and scalars at points with error and status: see `ConductorField.to_xarray`."""
+def point_dataset(field: PointData, values: dict[str, ComplexArray | FloatArray]) -> xarray.Dataset:
+    """Scalars and vectors (..., 3) at points, (..., 2) more of two polarisations, with error and status, by point."""
     both = field.status.ndim == field.points.ndim
     rows = ("point", "polarisation") if both else ("point",)
     variables: dict[str, Any] = {}
-    for name, values in vectors.items():
-        vector = values.ndim > field.status.ndim
-        dims = ("point", *(("component",) if vector else ()), *rows[1:])
-        shape = (-1, *values.shape[field.points.ndim - 1 :])
-        variables[name] = (dims, values.reshape(shape), {"units": field.unit})
-    named: dict[str, Any] = {"component": (("component",), ["x", "y", "z"])}
-    if both:
-        named["polarisation"] = (("polarisation",), list(COMPONENTS))
-    return _of_points(field, variables, rows, named)
-
-
-def _of_points(
-    field: PointData, variables: dict[str, Any], rows: tuple[str, ...], named: dict[str, Any]
-) -> xarray.Dataset:
-    """Variables with error, status and coordinates of points."""
-    flat = field.points.reshape(-1, 3)
     coordinates: dict[str, Any] = {
-        name: (("point",), flat[:, i], {"units": field.length_unit}) for i, name in enumerate(("x", "y", "z"))
+        name: (("point",), field.points.reshape(-1, 3)[:, i], {"units": field.length_unit})
+        for i, name in enumerate("xyz")
     }
     coordinates["wavenumber"] = ((), field.wavenumber, {"units": power(field.length_unit, -1), "long_name": "k"})
-    shape = (-1,) if len(rows) == 1 else (-1, len(COMPONENTS))
-    variables = dict(variables)
+    for name, value in values.items():
+        dims = rows
+        if value.ndim > field.status.ndim:
+            dims = ("point", "component", *rows[1:])
+            coordinates["component"] = (("component",), ["x", "y", "z"])
+        shape = (-1, *value.shape[field.points.ndim - 1 :])
+        variables[name] = (dims, value.reshape(shape), {"units": field.unit})
+    if both:
+        coordinates["polarisation"] = (("polarisation",), list(COMPONENTS))
+    shape = (-1, len(COMPONENTS)) if both else (-1,)
     variables["error"] = (rows, field.error.reshape(shape), {"units": field.unit})
     for name in ("error_by", "status", "method"):
         variables[name] = (rows, np.reshape(getattr(field, name), shape), {})
-    return dataset(variables, coordinates | named, boundary=field.boundary, order=field.order)
+    return dataset(variables, coordinates, boundary=field.boundary, order=field.order)

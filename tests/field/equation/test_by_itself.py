@@ -7,8 +7,8 @@ import creeping as cr
 import scatterers as sc
 from creeping.field.equation import effort
 from creeping.geometry.quadrature import body_nodes
-from studies.accuracy.bodies import DIPOLE_DEPTHS, bodies
-from studies.accuracy.joints import CASES, spread
+from studies.accuracy.bodies import bodies
+from studies.accuracy.edges import CASES, spread
 from tests.reference import dipoles, fundamental, sphere, stored
 from tests.reference.generatrix import pieces_profile
 from tests.reference.modal_conductor import scatter_conductor
@@ -211,9 +211,9 @@ def test_against_fundamental_solutions(name, k, direction, kind):
 @pytest.mark.slow
 @pytest.mark.parametrize("name, k, direction", [("peanut", 10.0, (0.2, 0.9, 0.4)), ("twisted", 12.0, DIP)])
 def test_conductors_against_dipoles(name, k, direction):
-    body, cloud, _ = bodies()[name]
+    body, cloud, depth = bodies()[name]
     d = np.array(direction) / np.linalg.norm(direction)
-    exact = dipoles.scatter(cloud, k, d[None], depth=DIPOLE_DEPTHS[name], per_wavelength=6.0)
+    exact = dipoles.scatter(cloud, k, d[None], depth=depth, per_wavelength=6.0)
     fan, r = fan_of(body, d), cr.fibonacci_directions(200)
     f = exact.far_field(r)[:, 0]
     found = cr.far_field(fan, r, wavenumber=k, boundary="pec", method="currents")
