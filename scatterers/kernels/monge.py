@@ -124,7 +124,9 @@ def grow(starts, frames, longest, points, normals, curvature, first, neighbours,
         half[c] = reach / wider
         while used + count > len(covered):
             longer = np.empty(2 * len(covered), np.int64)
-            longer[:used] = covered[:used]
+            # element by element: to assign one array to another takes seconds to compile
+            for k in range(used):
+                longer[k] = covered[k]
             covered = longer
         for k in range(count):
             j = reached[k]

@@ -292,15 +292,18 @@ def twice(values, damping, wanted, first, second, third, work, out):  # type: ig
         else:
             work[i] = 0.0
     for k in range(nz):
+        # element by element: to assign one array to another takes seconds to compile
         for i in range(nx):
-            slab[i] = work[i, k]
+            for j in range(ny):
+                slab[i, j] = work[i, k, j]
         _solve(first, slab)
         for i in range(nx):
             for j in range(ny):
                 slab[i, j] *= damping[i, k, j]
         _solve(first, slab)
         for i in range(nx):
-            work[i, k] = slab[i]
+            for j in range(ny):
+                work[i, k, j] = slab[i, j]
     for i in range(nx):
         # nothing is wanted where no value is
         if not filled[i]:

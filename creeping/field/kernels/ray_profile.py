@@ -76,7 +76,9 @@ def cubics(s, values, out):
                 for power in range(3, 0, -1):
                     p[power] = p[power] * shift + p[power - 1]
                 p[0] = p[0] * shift + d[j]
-            out[i] = p
+            # element by element: to assign one array to another takes seconds to compile
+            for power in range(4):
+                out[i, power] = p[power]
         if end < m:
             out[end - 1] = 0.0
         begin = end

@@ -281,10 +281,9 @@ def integrate_own(
         count = min(BLOCK, n - start)
         for i in range(BLOCK):
             for lane in range(lanes):
-                here[lane, i] = states[start + min(i, count - 1), lane]
+                here[lane, i] = there[lane, i] = states[start + min(i, count - 1), lane]
             left[i] = times[start + i] if i < count else 0.0
             h[i], used[i] = step, 0
-        there[:] = here
         known = False
         while True:
             going = False
@@ -307,7 +306,10 @@ def integrate_own(
                 derivative(weighted, lanes, z, g, w, f1)
                 _scaled(f1, size, steps, pointer(k, s * size))
                 if s == 0:
-                    slope[:] = last
+                    # element by element: to assign one array to another takes seconds to compile
+                    for lane in range(lanes):
+                        for i in range(BLOCK):
+                            slope[lane, i] = last[lane, i]
             project_block(z, lanes, g, new)
             known = True
             for i in range(BLOCK):
