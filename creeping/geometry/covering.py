@@ -28,11 +28,10 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import SurfaceError
-from creeping.geometry.memo import memo
 from creeping.geometry.patches import DEGREE, ENDS, Patches, lobatto, on_squares
 from creeping.geometry.piecewise import is_piecewise, nearest_crease, pieces_of, tips_of
 from creeping.geometry.quadrature import nearest_points
-from creeping.geometry.surface import Chart, Surface, normal, size
+from creeping.geometry.surface import Chart, Surface, memo, normal, size
 from creeping.geometry.triangulation import quadrilaterals
 
 POSITION, NORMAL = 2e-6, 3e-4

@@ -22,8 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import FloatArray
-from creeping.geometry.memo import memo
-from creeping.geometry.surface import Surface, normal, project, size
+from creeping.geometry.surface import Surface, memo, normal, project, size
 from creeping.geometry.triangulation import Triangulation, triangulate
 
 SECANTS = 24

@@ -24,8 +24,7 @@ from weakref import ref
 import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
-from creeping.geometry.memo import memo
-from creeping.geometry.surface import Surface, size
+from creeping.geometry.surface import Surface, memo, size
 
 
 class Evaluators(NamedTuple):

@@ -23,8 +23,7 @@ from creeping.field.results.labelled import COMPONENTS
 from creeping.field.results.point_result import PointField
 from creeping.geometry.checks import unit_of
 from creeping.geometry.incident import PlaneWave
-from creeping.geometry.parts import why_no_rays
-from creeping.geometry.surface import Surface, normal, project
+from creeping.geometry.surface import Surface, normal, project, why_no_rays
 from creeping.geometry.triangulation import Triangulation
 from creeping.plotting._drawing import Drawing, View, bare, caption, compose
 from creeping.plotting._strokes import Stroke

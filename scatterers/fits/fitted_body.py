@@ -8,9 +8,8 @@ import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.body import Crease, Piece
-from scatterers.charts.level_body import LevelBody
 from scatterers.charts.samples import Samples
-from scatterers.charts.star import star_map
+from scatterers.charts.star import LevelBody, star_map
 from scatterers.fits import cache as _fit_cache
 from scatterers.fits.cloud import FitReport, PieceCloud, PointCloud
 from scatterers.fits.pieces import fitted_pieces

@@ -108,8 +108,8 @@ class TensorSpline(Levelled):
 
     @property
     def sources(self) -> dict[str, Callable[..., None]]:
-        """Plain Python of the compiled functions; see `scatterers.charts.radial.SpaceLevel`."""
-        from scatterers.kernels.sphere_maps import forward
+        """Plain Python of the compiled functions; see `scatterers.charts.star.SpaceLevel`."""
+        from scatterers.kernels.charts import forward
         from scatterers.kernels.tensor import evaluate
 
         return {"level": evaluate, "forward": forward}

@@ -157,7 +157,7 @@ def _fitted(
         height = weight * w
         whole = np.concatenate([columns, np.broadcast_to(ridge, (len(k), terms, terms))], axis=1)
         right = np.pad(height, ((0, 0), (0, terms)))[..., None]
-        triangle: FloatArray = np.linalg.qr(np.concatenate([whole, right], axis=2), mode="r")
+        triangle = np.asarray(np.linalg.qr(np.concatenate([whole, right], axis=2), mode="r"))
         new = np.abs(np.einsum("njj->nj", triangle)[:, :terms]) / np.linalg.norm(whole, axis=1)
         weak = (new.min(axis=1) < WEAK) & (count[k] < counts[k])
         count[k[weak]] = np.minimum(count[k[weak]] * 5 // 4, counts[k[weak]])

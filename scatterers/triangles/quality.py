@@ -30,7 +30,7 @@ import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.triangles.jets import Jets, angle_weighted_normals
-from scatterers.triangles.parts import capped, chosen_part, taken_apart, united
+from scatterers.triangles.parts import capped, chosen_part, silent, taken_apart, united
 from scatterers.triangles.topology import cleaned, edges_of, flat_normals, oriented
 
 BAD = 0.03
@@ -352,7 +352,3 @@ def whole_body(
         vertices, triangles = cleaned(name, vertices, triangles, silent, silent)
         vertices, triangles = taken_apart(name, vertices, triangles, silent)
     return vertices, triangles
-
-
-def silent(_: str) -> None:
-    """Note of what needs no telling."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from creeping.kernels.exponential import cosine_sine, turns
-from scatterers.kernels.sphere_maps import turns as bodies_turns
+from scatterers.kernels.charts import turns as bodies_turns
 
 ANGLES = np.concatenate([np.random.default_rng(0).uniform(-0.5, 0.5, 3000), np.arange(-8, 9) / 16])
 
