@@ -22,7 +22,7 @@ import numpy as np
 from creeping._typing import FloatArray
 from scatterers.body import Body, Levelled, SphereMapped, cached, finite, polar_angles, positive
 from scatterers.charts.star import CubeSphereAtlas, FaceChart, PeriodicAtlas, PeriodicChart
-from scatterers.kernels.charts import cos_pi, cube_tangents, fill_frame, sin_pi, turns
+from scatterers.kernels.charts import cos_pi, cube_tangents, fill_frame, sin_pi
 from scatterers.kernels.compiled import Compiled, Kind
 
 
@@ -459,14 +459,9 @@ def _torus_forward(chart, points, derivatives, parameters):  # type: ignore[no-u
 
 def _torus_inverse(points, chart, parameters):  # type: ignore[no-untyped-def]
     """Chart variables of a block, in turns."""
-    major = parameters[0]
-    n = points.shape[1]
-    for i in range(n):
-        chart[0, i] = turns(points[1, i], points[0, i])
-    for i in range(n):
-        x, y = points[0, i], points[1, i]
-        chart[2, i] = math.sqrt(x * x + y * y) - major
-    for i in range(n):
-        chart[1, i] = turns(points[2, i], chart[2, i])
-    for i in range(n):
+    turn = 1 / (2 * math.pi)
+    for i in range(points.shape[1]):
+        x, y, z = points[0, i], points[1, i], points[2, i]
+        chart[0, i] = math.atan2(y, x) * turn
+        chart[1, i] = math.atan2(z, math.sqrt(x * x + y * y) - parameters[0]) * turn
         chart[2, i] = 0.0
