@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
-from scatterers.fits.patch import Closeness, Patch, polynomial_patch
+from scatterers.fits.patch import Closeness, Patch, polynomial_patch, second_order
 from scatterers.triangles.jets import angle_weighted_normals
 from scatterers.triangles.topology import components, cut, edges_of, flat_normals
 
@@ -67,8 +67,7 @@ class Sheet:
     def off(self, x: FloatArray) -> FloatArray:
         """Distance (n,) of points (n, 3) from it, of second order: at the tip of a cone it has no slope."""
         value, gradient = self.spline.value_and_gradient(x)
-        slope = np.linalg.norm(gradient, axis=1)
-        return np.asarray(2 * np.abs(value) / (slope + np.sqrt(slope**2 + 2 * self.bend * np.abs(value)) + 1e-300))
+        return second_order(value, np.linalg.norm(gradient, axis=1), self.bend)
 
     def normals(self, x: FloatArray) -> FloatArray:
         """Outward normals (n, 3) at points (n, 3); 0 where there is none."""

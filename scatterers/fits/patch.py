@@ -164,8 +164,7 @@ def polynomial_through(
         if np.median(lean) < 0:
             f, g, lean, q = -f, -g, -lean, -q
         bend = _bend(q, powers)
-        # the nearest point with Q = 0, of second order: next to the tip of a cone there is no slope to divide by
-        off = 2 * np.abs(f) / (steep + np.sqrt(steep**2 + 2 * bend * np.abs(f)) + 1e-300) * half
+        off = second_order(f, steep, bend) * half
         # a quadric may be a pair of sheets, of which the points take one
         curved = CLOSE * bend / float(np.median(steep)) * half / 8 if kind == "quadric" else 0.0
         slope = steep / np.median(steep)
@@ -174,6 +173,11 @@ def polynomial_through(
         if np.all(off <= max(tolerance, curved)) and np.all(lean >= least) and few:
             return _as_spline(q / np.median(steep), powers, middle, half), kind, float(np.sqrt(np.mean(off**2)))
     return None
+
+
+def second_order(value: FloatArray, slope: FloatArray, bend: float) -> FloatArray:
+    """Distance (n,) from Q = 0 by Q, |grad Q| and |Q''|; next to the tip of a cone there is no slope to divide by."""
+    return np.asarray(2 * np.abs(value) / (slope + np.sqrt(slope**2 + 2 * bend * np.abs(value)) + 1e-300))
 
 
 def _least(value: FloatArray, slope: FloatArray, normals: FloatArray) -> FloatArray:

@@ -26,7 +26,7 @@ import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.fits.cloud import left_at, tangents
-from scatterers.fits.tensor import TensorSpline, cardinal
+from scatterers.fits.tensor import TensorSpline, cardinal, side_of_cells
 from scatterers.kernels.compiled import SYMMETRIC, evaluated
 from scatterers.kernels.tensor import OVERREAD
 
@@ -183,13 +183,7 @@ def _product(a: FloatArray, b: FloatArray) -> float:
 
 def spacing_of(points: FloatArray, nodes: float) -> float:
     """Spacing at which the grid about points (n, 3) has so many nodes, L."""
-    side = np.ptp(points, axis=0)
-    low, high = 0.0, float(side.max())
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        fewer = np.prod(side / middle + 2 * PADDING + 5) < nodes
-        low, high = (low, middle) if fewer else (middle, high)
-    return high
+    return side_of_cells(np.ptp(points, axis=0), 2 * PADDING + 5, nodes)
 
 
 class _Equations:

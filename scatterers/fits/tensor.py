@@ -26,6 +26,16 @@ NODAL = np.array([1, 26, 66, 26, 1]) / 120
 """A B-spline at the nodes."""
 
 
+def side_of_cells(box: FloatArray, more: float, most: float) -> float:
+    """Side at which a box (3,), L, with ``more`` cells along each axis has so many of them at most."""
+    low, high = 0.0, float(box.max())
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        fewer = np.prod(box / middle + more) < most
+        low, high = (low, middle) if fewer else (middle, high)
+    return high
+
+
 @cache
 def interpolation_operator(n: int) -> FloatArray:
     """Matrix (n + 4, n) from node values to the uniform coefficients of the not-a-knot quintic.
