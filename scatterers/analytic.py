@@ -288,14 +288,9 @@ def _forward(s, points, derivatives, parameters):  # type: ignore[no-untyped-def
 def _inverse(points, s, parameters):  # type: ignore[no-untyped-def]
     """psi^-1 of a block, of unit length."""
     a, b, c, d = 1 / parameters[0], 1 / parameters[1], 1 / parameters[2], parameters[3]
-    n = points.shape[1]
-    for i in range(n):
-        s[1, i] = points[1, i]
-    if d != 0.0:
-        for i in range(n):
-            s[1, i] -= d * cos_pi(points[2, i])
-    for i in range(n):
-        x, y, z = a * points[0, i], b * s[1, i], c * points[2, i]
+    for i in range(points.shape[1]):
+        bent = d * cos_pi(points[2, i]) if d != 0.0 else 0.0
+        x, y, z = a * points[0, i], b * (points[1, i] - bent), c * points[2, i]
         scale = 1.0 / math.sqrt(x * x + y * y + z * z)
         s[0, i], s[1, i], s[2, i] = scale * x, scale * y, scale * z
 

@@ -14,14 +14,12 @@ import numpy as np
 
 from creeping._typing import ArrayLike, BoolArray, FloatArray, IntArray
 from scatterers.body import Shown, teller
-from scatterers.triangles.cad_file import SUFFIXES, CadReading, cad_triangles
+from scatterers.triangles.cad_file import POINTS, SUFFIXES, CadReading, cad_triangles
 from scatterers.triangles.files import read_mesh
 from scatterers.triangles.quality import Choice
 
 SOMEWHERE = np.array([0.3602, 0.5413, 0.7597])
 """Direction of the rays that tell inside from outside: along no axis or plane of symmetry."""
-POINTS = 10_000
-"""Of a CAD file."""
 CELLS = 512
 """Cells along a side of the plane across rays, at most."""
 MOST = 10_000_000

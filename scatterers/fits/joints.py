@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
-from scatterers.fits.patch import Closeness, Patch, polynomial_patch, second_order
+from scatterers.fits.patch import TIP, Closeness, Patch, polynomial_patch, second_order
 from scatterers.triangles.jets import angle_weighted_normals
 from scatterers.triangles.topology import components, cut, edges_of, flat_normals
 
@@ -52,8 +52,6 @@ ROUNDS = 12
 """Times that a quadric is fitted again to all that it holds."""
 TIPS, NEARLY = 100, 100.0
 """Vertices that may be tips, and their distance in that within which others are held: Q changes with its square."""
-STEEP = 1e-3
-"""Slope of a quadric, relative to the median, below which it has no normal: the tip of a cone."""
 
 
 class Sheet:
@@ -74,7 +72,7 @@ class Sheet:
         gradient = self.spline.gradient(x)
         slope = np.linalg.norm(gradient, axis=1, keepdims=True)
         # the slope is 1 in the median
-        return np.where(slope > STEEP, gradient / np.maximum(slope, 1e-300), 0.0)
+        return np.where(slope > TIP, gradient / np.maximum(slope, 1e-300), 0.0)
 
 
 def sheets_of(
@@ -336,7 +334,7 @@ def _across(
             # on the joint both are 0
             for sheet in (first, second):
                 value, gradient = sheet.spline.value_and_gradient(x)
-                x = x - (value / np.maximum(np.sum(gradient**2, axis=1), STEEP))[:, None] * gradient
+                x = x - (value / np.maximum(np.sum(gradient**2, axis=1), TIP))[:, None] * gradient
         return x
 
     def turn(x: FloatArray) -> FloatArray:

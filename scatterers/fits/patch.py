@@ -51,8 +51,8 @@ SPACING, BETWEEN, NODES = 1.8, 1.1, 4e5
 """Grid of a spline in units of the distance of points, of those with others between them, and its most nodes."""
 STEPS = 300
 """Of a fit: the borders of a piece take long, and gain little."""
-CLOSELY, ROUGHLY = ACCURACY, 3e-4
-"""Change of the curvatures at which fits stop: from jets, and from points of curved triangles, which err by more."""
+ROUGHLY = 3e-4
+"""Change of the curvatures at which fits to points of curved triangles stop, which err by more than jets."""
 MOST = 4_000_000
 """Triangles of a mesh that is made."""
 
@@ -92,7 +92,7 @@ def spline_patch(
     if jets is not None and triangles is not None:
         more, there = centroids(points, triangles, jets)
         distance = partial(signed_distance, points, jets)
-        accuracy, cells = CLOSELY, BETWEEN
+        accuracy, cells = ACCURACY, BETWEEN
         mean = np.concatenate([np.where(jets.fitted, jets.mean, np.nan), np.full(len(more), np.nan)])
         points, normals = np.concatenate([points, more]), np.concatenate([normals, there])
     grid = max(cells * spacing, spacing_of(points, NODES))

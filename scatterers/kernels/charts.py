@@ -266,29 +266,14 @@ def one_cell(box: FloatArray, of_map: FloatArray) -> FloatArray:
 
 
 def inverse(points, s, parameters):  # type: ignore[no-untyped-def]
-    """psi^-1 of a block.
-
-    The shift is not taken from `_spine` so that the loops are vectorised; each touches few rows for the same reason.
-    """
-    a, b, c = 1 / parameters[HALF_AXES], 1 / parameters[HALF_AXES + 1], 1 / parameters[HALF_AXES + 2]
-    spine, middle, per_half = int(parameters[AXIS]), parameters[MIDDLE], parameters[PER_HALF]
-    n = points.shape[1]
-    for axis in range(3):
-        centre, start = parameters[CENTRE + axis], SHIFTS + axis * (DEGREE + 1)
-        if per_half == 0.0 or axis == spine:
-            for i in range(n):
-                s[axis, i] = points[axis, i] - centre
-            continue
-        c0, c1, c2, c3 = parameters[start], parameters[start + 1], parameters[start + 2], parameters[start + 3]
-        c4, c5, c6 = parameters[start + 4], parameters[start + 5], parameters[start + 6]
-        for i in range(n):
-            t = (points[spine, i] - middle) * per_half
-            t = -REACH if t < -REACH else t
-            t = REACH if t > REACH else t
-            shift = c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * (c5 + t * c6)))))
-            s[axis, i] = points[axis, i] - shift - centre
-    for i in range(n):
-        x, y, z = a * s[0, i], b * s[1, i], c * s[2, i]
+    """psi^-1 of a block."""
+    a, b, c = parameters[HALF_AXES], parameters[HALF_AXES + 1], parameters[HALF_AXES + 2]
+    for i in range(points.shape[1]):
+        x, y, z = points[0, i], points[1, i], points[2, i]
+        shift, _ = _spine((x, y, z), parameters)
+        x = (x - shift[0] - parameters[CENTRE]) / a
+        y = (y - shift[1] - parameters[CENTRE + 1]) / b
+        z = (z - shift[2] - parameters[CENTRE + 2]) / c
         scale = 1.0 / math.sqrt(x * x + y * y + z * z)
         s[0, i], s[1, i], s[2, i] = scale * x, scale * y, scale * z
 

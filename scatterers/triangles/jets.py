@@ -30,7 +30,7 @@ AT_MOST = 112
 FEWEST = 36
 """Neighbours below which a jet of degree 6 is not fitted."""
 SHARE = 5000
-"""Vertices treated at a time."""
+"""Vertices, triangles or points treated at a time."""
 RIDGE = 2e-4
 """Least singular value, relative to terms of size 1, at which a combination of terms still counts."""
 WEAK = 0.02
@@ -38,8 +38,6 @@ WEAK = 0.02
 SAME_SHEET = 0.3
 """Cosine between the normals of a vertex and its neighbours."""
 STEPS, FOOT_STEPS = 3, 8
-JET_POINTS_SHARE = 20_000
-"""Triangles treated at a time."""
 # powers of u and v in the order of `Jets.coefficients`
 POWERS = [(d - b, b) for d in range(1, 7) for b in range(d + 1)]
 DEGREES = (5, 14, 27)
@@ -260,15 +258,15 @@ def centroids(vertices: FloatArray, triangles: IntArray, jets: Jets) -> tuple[Fl
     """Points (m, 3) and outward unit normals (m, 3) at the middles of the triangles whose corners all have jets."""
     triangles = triangles[np.all(jets.fitted[triangles], axis=1)]
     points, normals = np.empty((len(triangles), 3)), np.empty((len(triangles), 3))
-    for start in range(0, len(triangles), JET_POINTS_SHARE):
-        some = triangles[start : start + JET_POINTS_SHARE]
+    for start in range(0, len(triangles), SHARE):
+        some = triangles[start : start + SHARE]
         at = vertices[some].mean(axis=1)
         for _ in range(STEPS):
             value, gradient = _distance(vertices, jets, some, at)
             at = at - (value / np.sum(gradient**2, axis=1))[:, None] * gradient
         gradient = _distance(vertices, jets, some, at)[1]
-        points[start : start + JET_POINTS_SHARE] = at
-        normals[start : start + JET_POINTS_SHARE] = gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
+        points[start : start + SHARE] = at
+        normals[start : start + SHARE] = gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
     return points, normals
 
 
@@ -281,8 +279,8 @@ def signed_distance(vertices: FloatArray, jets: Jets, at: FloatArray) -> FloatAr
 
     nearest = cKDTree(vertices).query(at)[1]
     out = np.empty(len(at))
-    for start in range(0, len(at), JET_POINTS_SHARE):
-        some = slice(start, start + JET_POINTS_SHARE)
+    for start in range(0, len(at), SHARE):
+        some = slice(start, start + SHARE)
         out[some] = _foot(vertices, jets, nearest[some], at[some])
     return out
 
