@@ -95,19 +95,12 @@ def meridian(r: float, w: float, row: int, p: FloatArray) -> tuple[float, float,
 
 
 @helper
-def _between(r: float, w: float, row: int, p: FloatArray) -> bool:
-    """Whether a point lies between the normals at both ends of a segment."""
+def _distance(r: float, w: float, row: int, p: FloatArray) -> float:
+    """Distance to a segment; between the normals at its ends along grad G, G taken as the quadratic that it is."""
     w0, r0 = w - p[row + START], r - p[row + START + 1]
     w1, r1 = w - p[row + END], r - p[row + END + 1]
     after = w0 * p[row + START_TANGENT] + r0 * p[row + START_TANGENT + 1] >= 0.0
-    before = w1 * p[row + END_TANGENT] + r1 * p[row + END_TANGENT + 1] < 0.0
-    return bool(after and before)
-
-
-@helper
-def _distance(r: float, w: float, row: int, p: FloatArray) -> float:
-    """Distance to a segment; between the normals at its ends along grad G, G taken as the quadratic that it is."""
-    if _between(r, w, row, p):
+    if after and w1 * p[row + END_TANGENT] + r1 * p[row + END_TANGENT + 1] < 0.0:
         value, gr, gw, rr, rw, ww, _ = meridian(r, w, row, p)
         square = gr * gr + gw * gw
         if square > 0.0:
@@ -116,15 +109,7 @@ def _distance(r: float, w: float, row: int, p: FloatArray) -> float:
             bend = max(abs(rr), abs(ww)) if value < 0.0 else -max(abs(rr), abs(ww))
         root = math.sqrt(max(square - 2.0 * value * bend, 0.0))
         return 2.0 * abs(value) / max(math.sqrt(square) + root, TINY)
-    return math.sqrt(min(_off_end(r, w, row + START, p), _off_end(r, w, row + END, p)))
-
-
-@helper
-def _off_end(r: float, w: float, at: int, p: FloatArray) -> float:
-    """Square of the distance to an end of a segment."""
-    across, along = r - p[at + 1], w - p[at]
-    square: float = along * along + across * across
-    return square
+    return math.sqrt(min(w0 * w0 + r0 * r0, w1 * w1 + r1 * r1))
 
 
 @helper
@@ -158,12 +143,18 @@ def level(r: float, w: float, p: FloatArray) -> tuple[float, float, float, float
     """What `meridian` gives, of the nearest segment."""
     row = nearest(r, w, p)
     found = meridian(r, w, row, p)
-    if p[WHOLE] == 1.0 and not _between(r, w, row, p):
-        end = row + START if _off_end(r, w, row + START, p) < _off_end(r, w, row + END, p) else row + END
-        plane = _plane(r, w, end, p)
-        if plane * found[0] < 0.0:
-            nw, nr = -p[end + 3], p[end + 2]
-            return plane, nr, nw, 0.0, 0.0, 0.0, nr / max(r, TINY)
+    if p[WHOLE] == 1.0:
+        after = (w - p[row + START]) * p[row + START_TANGENT] + (r - p[row + START + 1]) * p[
+            row + START_TANGENT + 1
+        ] >= 0.0
+        before = (w - p[row + END]) * p[row + END_TANGENT] + (r - p[row + END + 1]) * p[row + END_TANGENT + 1] < 0.0
+        if not (after and before):
+            w0, r0, w1, r1 = w - p[row], r - p[row + 1], w - p[row + END], r - p[row + END + 1]
+            end = START if w0 * w0 + r0 * r0 < w1 * w1 + r1 * r1 else END
+            plane = _plane(r, w, row + end, p)
+            if plane * found[0] < 0.0:
+                nw, nr = -p[row + end + 3], p[row + end + 2]
+                return plane, nr, nw, 0.0, 0.0, 0.0, nr / max(r, TINY)
     return found
 
 
