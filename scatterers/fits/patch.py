@@ -39,9 +39,9 @@ OUTLIER, EVENLY = 5.0, 1.4
 CLOSE = 2e-4
 LEAN = 0.35
 """Angle between the normals of triangles and a quadric through their corners, radians."""
-SLIGHT, FEW = 0.1, 0.3
+SLIGHT = 0.1
 """Of the median slope of a quadric: with less, as next to the tip of a cone, it turns much within a triangle, and
-normals need only be on the same side; and the largest share of such points."""
+normals need only be on the same side."""
 TIP = 1e-3
 """Of the median slope: with less there is no normal to compare. Also the share of a piece's size by which the sheets of
 a cone may miss their tip."""
@@ -169,8 +169,7 @@ def polynomial_through(
         curved = CLOSE * bend / float(np.median(steep)) * half / 8 if kind == "quadric" else 0.0
         slope = steep / np.median(steep)
         least = np.select([slope > SLIGHT, slope > TIP], [np.cos(LEAN), 0.0], -1.0)
-        few = np.mean(slope <= SLIGHT) < FEW and np.sum(slope <= TIP) <= 1
-        if np.all(off <= max(tolerance, curved)) and np.all(lean >= least) and few:
+        if np.all(off <= max(tolerance, curved)) and np.all(lean >= least) and np.sum(slope <= TIP) <= 1:
             return _as_spline(q / np.median(steep), powers, middle, half), kind, float(np.sqrt(np.mean(off**2)))
     return None
 
