@@ -1,17 +1,13 @@
 """Bodies for `creeping`, one a file; each satisfies the Surface protocol by its structure alone."""
 
-from scatterers.bodies import Bodies
+from scatterers.analytic import Ellipsoid, Sphere, Torus, TwistedEllipsoid
 from scatterers.cad import Cad
-from scatterers.cylinder import Capsule, Cone, ConeSphere, Cylinder
-from scatterers.ellipsoid import Ellipsoid, Sphere, TwistedEllipsoid
-from scatterers.facets import Facets
-from scatterers.gridded import Gridded
-from scatterers.implicit import Implicit
+from scatterers.facets import Bodies, Facets
+from scatterers.implicit import Gridded, Implicit
 from scatterers.mesh import Mesh, examined_mesh
-from scatterers.ogive import Almond, DoubleOgive, Ogive
 from scatterers.revolution import Revolution
 from scatterers.speed import Coating, ExpressionSpeed
-from scatterers.torus import Torus
+from scatterers.turned import Almond, Capsule, Cone, ConeSphere, Cylinder, DoubleOgive, Ogive
 
 __all__ = [
     "Almond",

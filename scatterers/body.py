@@ -12,14 +12,21 @@ import reprlib
 import sys
 from collections.abc import Callable, Sequence, Sized
 from dataclasses import dataclass, fields
+from functools import cached_property
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from creeping._typing import ArrayLike, FloatArray, IntArray
 from scatterers.kernels.compiled import SYMMETRIC, Compiled, evaluated, inverted, mapped
 from scatterers.speed import as_speed
+
+# for type checkers a property that is computed once is a plain one: not all take the other for one in a protocol
+if TYPE_CHECKING:
+    cached = property
+else:
+    cached = cached_property
 
 MOST_NUMBERS = 10**9
 SHARP = ("edge", "tip")

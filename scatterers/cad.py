@@ -15,14 +15,12 @@ from scatterers.body import teller
 from scatterers.fits.cache import key_of
 from scatterers.fits.cloud import PieceCloud, PointCloud
 from scatterers.fits.fitted_body import FittedBody
-from scatterers.triangles.cad_file import CadPoints, CadReading, kind_of, read_cad
+from scatterers.triangles.cad_file import POINTS, CadPoints, CadReading, kind_of, read_cad
 from scatterers.triangles.jets import osculating_jets, signed_distance
 from scatterers.triangles.quality import Choice, MeshQuality, assess
 from scatterers.triangles.regions import regions_of
 from scatterers.triangles.topology import edges_of
 
-POINTS = 10_000
-"""Points of the body that are asked for."""
 CURVED = 30
 """Triangles to a full turn of a curved face of a body with edges."""
 SPACING = 2.0

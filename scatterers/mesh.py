@@ -24,8 +24,8 @@ from scatterers.fits.joints import Jointed, jointed
 from scatterers.fits.solver import spacing_of
 from scatterers.triangles.files import TriangleMesh, mesh_bytes, read_mesh
 from scatterers.triangles.jets import Jets, angle_weighted_normals, centroids, osculating_jets, signed_distance
-from scatterers.triangles.quality import FEWEST_RIMS, Choice, MeshQuality, assess, jumps_at, noise_at_most
-from scatterers.triangles.regions import regions_of
+from scatterers.triangles.quality import Choice, MeshQuality, assess, jumps_at, noise_at_most
+from scatterers.triangles.regions import FEWEST, regions_of
 from scatterers.triangles.subdivision import MOST_SUBDIVIDED, Subdivision, edges_where_curved, subdivided
 
 CLEAN, NOISY = 1.3, 4.0
@@ -314,7 +314,7 @@ def _pieces(mesh: TriangleMesh, quality: MeshQuality, joints: Jointed | None, na
 def _with_joints(quality: MeshQuality, mesh: TriangleMesh, jets: Jets) -> tuple[MeshQuality, Jointed | None]:
     """What jets make of the vertices, corrected where the body is planes and quadrics that join; and these."""
     # between long triangles jets tell of no jumps, and noise drowns them
-    told = quality.jumps >= FEWEST_RIMS or quality.verdict == "too coarse"
+    told = quality.jumps >= FEWEST or quality.verdict == "too coarse"
     if not told and quality.noise < NOISE:
         return quality, None
     clean = jets.fitted & ~quality.bad & ~jumps_at(jets, quality.edge_mean)

@@ -187,8 +187,7 @@ def _on_body(shape: Any, ports: Ports) -> tuple[Any, str]:
     from creeping.errors import InvalidInputError
     from creeping.geometry.arguments import rays_refused
     from creeping.geometry.checks import unit_of
-    from creeping.geometry.parts import why_no_rays
-    from creeping.geometry.surface import project, size
+    from creeping.geometry.surface import project, size, why_no_rays
 
     if why_no_rays(shape):
         raise InvalidInputError(rays_refused(shape))

@@ -75,7 +75,7 @@ def _surface(
     from creeping import check_surface
     from creeping.commands.forecast import forecast
     from creeping.field.arguments import wavelengths_across
-    from creeping.geometry.parts import why_no_rays
+    from creeping.geometry.surface import why_no_rays
 
     if getattr(shape, "speed", None) is None:
         # of a body six wavelengths across where no wavenumber is given

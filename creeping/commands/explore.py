@@ -46,8 +46,7 @@ def explore(
     from creeping.explorer.request import ViewRequest, angles
     from creeping.geometry.arguments import rays_refused
     from creeping.geometry.directions import unit_direction
-    from creeping.geometry.parts import why_no_rays
-    from creeping.geometry.surface import size
+    from creeping.geometry.surface import size, why_no_rays
     from creeping.rays.reach import body_length
 
     def progress(text: str) -> None:

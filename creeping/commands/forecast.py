@@ -17,8 +17,8 @@ from creeping.field.frequency import suited
 from creeping.field.frequency import wavenumber as wavenumber_of
 from creeping.geodesics.equations import points_of_charts
 from creeping.geometry.checks import unit_of
-from creeping.geometry.parts import why_no_rays
 from creeping.geometry.piecewise import has_edges, is_piecewise
+from creeping.geometry.surface import why_no_rays
 
 SOLVED = "errors of 0.01 to 1 % of the largest amplitude (0.1 dB)"
 COARSE = "errors of 0.1 to 3 % of the largest amplitude (0.3 dB), for want of time: coarse tiles and few steps"

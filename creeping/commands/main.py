@@ -181,7 +181,7 @@ def run(
     from creeping.commands import run_field as _field_run
     from creeping.commands import run_report as _run_results
     from creeping.geometry.incident import PlaneWave, PointSource
-    from creeping.geometry.parts import why_no_rays
+    from creeping.geometry.surface import why_no_rays
     from creeping.rays.fan import enough_steps
     from creeping.rays.reach import ray_length
 

@@ -146,7 +146,7 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Prog
 
 def _flow(read: Any, body: Any, request: Any, cache: bool, progress: Any) -> Any:
     from creeping import build_phase_map
-    from creeping.geometry.parts import why_no_rays
+    from creeping.geometry.surface import why_no_rays
     from creeping.sweeping.request import solved_alone
     from creeping.sweeping.sweeper import NoFlow, outputs_of
 

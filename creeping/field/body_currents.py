@@ -22,9 +22,8 @@ from creeping.field.equation import solving
 from creeping.field.equation.solving import Solved, asked_solution, solution_for
 from creeping.field.problem import has_expansions
 from creeping.geometry.arguments import one_of
-from creeping.geometry.memo import memo_of
 from creeping.geometry.piecewise import is_piecewise
-from creeping.geometry.surface import size
+from creeping.geometry.surface import memo_of, size
 from creeping.rays.fan import RayFan
 from creeping.shadow.line import ShadowLine
 

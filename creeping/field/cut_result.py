@@ -26,8 +26,7 @@ from creeping.field.results.point_result import FieldStatus, NearField
 from creeping.field.routes import TRUST, affordable
 from creeping.geometry.arguments import number_between, one_of, positive_number, real_array
 from creeping.geometry.directions import unit_direction
-from creeping.geometry.parts import inside
-from creeping.geometry.surface import Surface, project
+from creeping.geometry.surface import Surface, inside, project
 from creeping.rays.fan import RayFan
 from creeping.shadow.line import ShadowLine
 

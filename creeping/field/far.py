@@ -47,9 +47,8 @@ from creeping.field.waves.piecewise_far import piecewise_far_field, tip_waves
 from creeping.geometry.arguments import one_of
 from creeping.geometry.checks import unit_of
 from creeping.geometry.directions import fibonacci_directions
-from creeping.geometry.memo import memo
 from creeping.geometry.piecewise import is_piecewise
-from creeping.geometry.surface import size
+from creeping.geometry.surface import memo, size
 from creeping.rays.fan import RayFan
 from creeping.rays.uncertain_body import coarse_factor, coarse_fan
 from creeping.storage.memory import blocks, within_budget

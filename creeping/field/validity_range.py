@@ -212,7 +212,7 @@ def _along_and_across(body: Surface, points: FloatArray, directions: FloatArray)
     """kappa_n and |kappa_t| (n,), 1/L, at points (n, 3) of rays in the directions (n, 3)."""
     if is_piecewise(body):
         return normal_curvature(body, points, directions), _across(body, points, directions)
-    from creeping.geometry.kernels.nearest import normal_sections
+    from creeping.kernels.nearest import normal_sections
 
     x, p = np.ascontiguousarray(points), np.ascontiguousarray(directions)
     along, across = np.empty(len(x)), np.empty(len(x))

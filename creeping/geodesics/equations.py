@@ -21,9 +21,8 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.geometry.curvature import curvature_norms, principal_curvature_bound, second_form
 from creeping.geometry.evaluators import speed_of, speed_values
-from creeping.geometry.memo import memo
 from creeping.geometry.piecewise import is_piecewise, pieces_of
-from creeping.geometry.surface import Surface, size
+from creeping.geometry.surface import Surface, memo, size
 from creeping.geometry.triangulation import triangulate
 
 USUAL = 0.98

@@ -13,8 +13,7 @@ import numpy as np
 
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.geometry.parts import why_no_rays
-from creeping.geometry.surface import Surface
+from creeping.geometry.surface import Surface, why_no_rays
 from creeping.geometry.triangulation import checked_extent
 from creeping.storage.memory import within_budget
 

@@ -110,8 +110,6 @@ def check_surface(body: Surface) -> SurfaceReport:
     checked_body(body)
     mesh = triangulate(body.level, body.gradient, body.bounds)
     points = mesh.vertices
-    corners = points[mesh.triangles]
-    doubled_area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=-1)
     components = mesh.components
     return SurfaceReport(
         checks=(
@@ -120,7 +118,7 @@ def check_surface(body: Surface) -> SurfaceReport:
             *_atlas_checks(body, points),
         ),
         genus=components - mesh.euler_characteristic // 2,
-        area=float(doubled_area.sum() / 2),
+        area=mesh.area,
         unit=unit_of(body),
     )
 

@@ -28,11 +28,11 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import SurfaceError
-from creeping.geometry.memo import memo
 from creeping.geometry.patches import DEGREE, ENDS, Patches, lobatto, on_squares
 from creeping.geometry.piecewise import is_piecewise, nearest_crease, pieces_of, tips_of
 from creeping.geometry.quadrature import nearest_points
-from creeping.geometry.surface import Chart, Surface, normal, size
+from creeping.geometry.surface import Chart, Surface, memo, normal, size
+from creeping.geometry.tile_rules import SAME
 from creeping.geometry.triangulation import quadrilaterals
 
 POSITION, NORMAL = 2e-6, 3e-4
@@ -56,8 +56,6 @@ NEWTON = 20
 
 CELLS = (3, 4, 5, 6, 8, 12, 24)
 """Cells of the meshes of a smooth body; the first that is of the kind of the last is taken."""
-SAME = 1e-9
-"""Distance of corners that are one, in body sizes."""
 SQUARE = 0.8
 """Largest |cos| of a corner of the quadrilateral that two triangles make."""
 EVENED = 5

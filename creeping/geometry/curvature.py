@@ -22,8 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import FloatArray
-from creeping.geometry.memo import memo
-from creeping.geometry.surface import Surface, normal, project, size
+from creeping.geometry.surface import Surface, memo, normal, project, size
 from creeping.geometry.triangulation import Triangulation, triangulate
 
 SECANTS = 24
@@ -87,23 +86,21 @@ def gaussian_curvature(body: Surface, points: FloatArray) -> FloatArray:
 
 def principal_curvature_bound(body: Surface, points: FloatArray) -> float:
     """Largest |kappa_1| or |kappa_2| over points (..., 3), L, of the body, 1/L."""
-    g, h = body.gradient(points), body.hessian(points)
-    norm = np.linalg.norm(g, axis=-1)
-    n = g / norm[..., None]
-    tangential = np.eye(3) - n[..., :, None] * n[..., None, :]
-    shape = tangential @ h @ tangential / norm[..., None, None]
-    return float(np.max(np.abs(np.linalg.eigvalsh(shape))))
+    return float(np.max(np.abs(np.linalg.eigvalsh(_shape_operators(body, points)))))
 
 
 def curvature_norms(body: Surface, x: FloatArray) -> FloatArray:
     """Norm of the shape operator at points (n, 3): the larger principal curvature up to a factor √2, (n,), 1/L."""
-    if not len(x):
-        return np.zeros(0)
-    gradient = body.gradient(x)
-    g = np.linalg.norm(gradient, axis=1)
-    n = gradient / g[:, None]
-    P = np.eye(3) - n[:, :, None] * n[:, None, :]
-    return np.asarray(np.linalg.norm(P @ body.hessian(x) @ P, axis=(1, 2)) / g)
+    return np.asarray(np.linalg.norm(_shape_operators(body, x), axis=(1, 2))) if len(x) else np.zeros(0)
+
+
+def _shape_operators(body: Surface, x: FloatArray) -> FloatArray:
+    """P H P/|grad F|, 1/L, P the projection onto tangents: (..., 3) -> (..., 3, 3)."""
+    g = body.gradient(x)
+    norm = np.linalg.norm(g, axis=-1)
+    n = g / norm[..., None]
+    P = np.eye(3) - n[..., :, None] * n[..., None, :]
+    return np.asarray(P @ body.hessian(x) @ P / norm[..., None, None])
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,10 +169,8 @@ def parabolic_crossings(
         a, Kb = np.where(same[:, None], x, a), np.where(same, 0.5 * Kb, K)
         b, Ka = np.where(same[:, None], b, x), np.where(same, K, 0.5 * Ka)
     n = normal(body, x)
-    flat = np.eye(3) - n[:, :, None] * n[:, None, :]
-    shape = flat @ body.hessian(x) @ flat / np.linalg.norm(body.gradient(x), axis=1)[:, None, None]
     # of the three eigenvalues that of n is 0, and one of the others nearly
-    curvatures, vectors = np.linalg.eigh(shape)
+    curvatures, vectors = np.linalg.eigh(_shape_operators(body, x))
     largest = np.argmax(np.abs(curvatures), axis=1)[:, None]
     across = np.take_along_axis(curvatures, largest, axis=1)[:, 0]
     u = np.cross(n, np.take_along_axis(vectors, largest[..., None], axis=2)[:, :, 0])

@@ -24,8 +24,7 @@ from weakref import ref
 import numpy as np
 
 from creeping._typing import Any, FloatArray, IntArray
-from creeping.geometry.memo import memo
-from creeping.geometry.surface import Surface, size
+from creeping.geometry.surface import Surface, memo, size
 
 
 class Evaluators(NamedTuple):
@@ -45,8 +44,8 @@ class Evaluators(NamedTuple):
 def evaluators(body: Surface) -> Iterator[Evaluators]:
     """Evaluators of a body for the kernels called inside; what its methods raise there is raised at the end."""
     speed = speed_of(body)
-    level = _offered(body, "level", lambda: _level(body), body)
-    weight = level if speed is None else _offered(body, "speed", lambda: _speed(body), speed)
+    level = _offered(body, "level", lambda: _called_back(body, weight=False), body)
+    weight = level if speed is None else _offered(body, "speed", lambda: _called_back(body, weight=True), speed)
     with _told(level, weight):
         yield Evaluators(level.function, level.parameters, weight.function, weight.parameters, speed is not None)
 
@@ -99,7 +98,8 @@ def entries_of(hessian: FloatArray) -> FloatArray:
     return np.stack([hessian[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))])
 
 
-def _level(body: Surface) -> Any:
+def _called_back(body: Surface, *, weight: bool) -> Any:
+    """F of a body, or its speed, as a function that kernels call."""
     from creeping.kernels.callback import level_callback
 
     known: Any = _reference(body)
@@ -108,27 +108,11 @@ def _level(body: Surface) -> Any:
         points: FloatArray, values: FloatArray, gradients: FloatArray, hessians: FloatArray, _: FloatArray
     ) -> None:
         one, x = known(), np.ascontiguousarray(points.T)
-        values[:] = one.level(x)
-        gradients[:] = np.asarray(one.gradient(x)).T
-        hessians[:] = entries_of(np.asarray(one.hessian(x)))
+        values[:] = one.speed.value(x) if weight else one.level(x)
+        gradients[:] = np.asarray((one.speed if weight else one).gradient(x)).T
+        hessians[:] = entries_of(speed_hessian(one, x) if weight else np.asarray(one.hessian(x)))
 
     return level_callback(level)
-
-
-def _speed(body: Surface) -> Any:
-    from creeping.kernels.callback import level_callback
-
-    known: Any = _reference(body)
-
-    def speed(
-        points: FloatArray, values: FloatArray, gradients: FloatArray, hessians: FloatArray, _: FloatArray
-    ) -> None:
-        one, x = known(), np.ascontiguousarray(points.T)
-        values[:] = one.speed.value(x)
-        gradients[:] = np.asarray(one.speed.gradient(x)).T
-        hessians[:] = entries_of(speed_hessian(one, x))
-
-    return level_callback(speed)
 
 
 def _locator(body: Surface) -> Any:

@@ -13,10 +13,8 @@ from scipy.spatial import ConvexHull
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import InvalidInputError
-from creeping.geometry.memo import memo
-from creeping.geometry.parts import is_faceted, why_no_rays
 from creeping.geometry.patches import halved
-from creeping.geometry.surface import jet, normal, project, size
+from creeping.geometry.surface import is_faceted, jet, memo, normal, project, size, why_no_rays
 from creeping.geometry.triangulation import Triangulation, triangulate
 
 SAMPLE = 0.1

@@ -11,6 +11,7 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geometry.patches import PLANE, Triangles, sides_of, turns_of
+from creeping.geometry.triangulation import Triangulation, connected
 
 MOST = 500
 """Corners of a face's outline at most: ears take the square of them."""
@@ -52,21 +53,16 @@ def with_whole_faces(body: Any) -> Triangles | None:
     made = np.concatenate(found)
     used, renumbered = np.unique(made, return_inverse=True)
     whole = Triangles(vertices[used], renumbered.reshape(-1, 3), bool(getattr(body, "tessellated", False)))
-    same = np.isclose(_area(whole.vertices, whole.triangles), _area(vertices, triangles), rtol=1e-6)
+    area, before = (Triangulation(*one).area for one in ((whole.vertices, whole.triangles), (vertices, triangles)))
     closed = np.all(np.bincount(sides_of(whole.triangles)[1].ravel()) == 2)
-    return whole if same and closed and len(made) < len(triangles) else None
+    return whole if np.isclose(area, before, rtol=1e-6) and closed and len(made) < len(triangles) else None
 
 
 def _faces(vertices: FloatArray, triangles: IntArray) -> IntArray:
     """Number of the face of each triangle (t,)."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     _, number = sides_of(triangles)
     turned, beside = turns_of(vertices, triangles, number)
-    one, other = beside[turned < PLANE].T
-    graph = coo_matrix((np.ones(len(one)), (one, other)), shape=(len(triangles), len(triangles)))
-    return np.asarray(connected_components(graph, directed=False)[1])
+    return connected(len(triangles), beside[turned < PLANE])[1]
 
 
 def _outlines(triangles: IntArray, face: IntArray) -> list[list[IntArray]] | None:
@@ -112,11 +108,6 @@ def _normal(vertices: FloatArray, triangles: IntArray) -> FloatArray:
     a, b, c = np.moveaxis(vertices[triangles], 1, 0)
     total = np.sum(np.cross(b - a, c - a), axis=0)
     return np.asarray(total / np.linalg.norm(total))
-
-
-def _area(vertices: FloatArray, triangles: IntArray) -> float:
-    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
-    return float(0.5 * np.sum(np.linalg.norm(np.cross(b - a, c - a), axis=1)))
 
 
 def _cut(vertices: FloatArray, loops: list[IntArray], normal: FloatArray) -> IntArray | None:

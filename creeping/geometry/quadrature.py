@@ -27,10 +27,8 @@ from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import SurfaceError
 from creeping.geometry.curvature import adjugate_form, second_form
 from creeping.geometry.evaluators import entries_of, evaluators
-from creeping.geometry.memo import memo
-from creeping.geometry.parts import inside
 from creeping.geometry.piecewise import Tiles, is_piecewise, pieces_of
-from creeping.geometry.surface import Surface, size
+from creeping.geometry.surface import Surface, inside, memo, size
 from creeping.geometry.tile_rules import CLOSED, FEWEST, MOST, MOST_CELLS, MOST_NODES, PieceRules, Rules, finer, graded
 from creeping.kernels.threads import in_slices
 
@@ -265,7 +263,7 @@ def nodes_at(body: Surface, points: FloatArray, normals: FloatArray) -> BodyNode
 
 def nearest_points(body: Surface, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Points of the body nearest to points near it: x, n (m, 3), H/|grad F| (m, 6) and the height above it (m,)."""
-    from creeping.geometry.kernels.nearest import nearest
+    from creeping.kernels.nearest import nearest
 
     m = len(points)
     x, n, hessians, height = np.empty((3, m)), np.empty((3, m)), np.empty((6, m)), np.empty(m)

@@ -11,8 +11,7 @@ import numpy as np
 
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import SurfaceError
-from creeping.geometry.memo import memo
-from creeping.geometry.surface import Surface, size
+from creeping.geometry.surface import Surface, memo, size
 
 ROUNDING = 1e-11
 """Departure from the equations above, in sizes of the body, that is rounding: psi may be an iteration."""

@@ -6,16 +6,74 @@ it by the margin of the spline. The polar frame of a chart with tangents T = [x_
 the orthogonal polar factor E = T (T^T T)^(-1/2): orthonormal, tangent, and nearest to T.
 
 Sources: Derivations, R1 and B2.
+
+Also here: what is made of a body or a fan once and kept as long as it lives: by identity, as bodies may be equal to
+others, or not be hashable.
+
+Bodies without creeping rays, on flat facets or of several parts, have ``bounds``, ``inside(points)``, and in place of F
+the corners of their facets (``vertices``, ``triangles``, with ``hidden(points, direction)``), or ``parts``, bodies of
+any kind, with ``turns``, ``shifts`` and ``own(number, points)``.
 """
 
 import hashlib
-from collections.abc import Sequence
-from typing import Protocol, runtime_checkable
+from collections.abc import Callable, Hashable, Sequence
+from typing import Protocol, TypeVar, runtime_checkable
+from weakref import finalize
 
 import numpy as np
 
-from creeping._typing import Any, FloatArray, IntArray
-from creeping.geometry.parts import why_no_rays
+from creeping._typing import Any, BoolArray, FloatArray, IntArray
+
+T = TypeVar("T")
+_KEPT: dict[int, dict[str, Any]] = {}
+
+
+def memo(owner: object, name: str, make: Callable[[], T]) -> T:
+    """What ``make`` gives at the first call for an owner and a name."""
+    if id(owner) not in _KEPT:
+        try:
+            finalize(owner, _KEPT.pop, id(owner), None)
+        except TypeError:
+            # without weak references the identity may come again
+            return make()
+        _KEPT[id(owner)] = {}
+    own = _KEPT[id(owner)]
+    if name not in own:
+        own[name] = make()
+    found: T = own[name]
+    return found
+
+
+def memo_of(owner: object, name: str, key: Hashable, make: Callable[[], T], most: int) -> T:
+    """The same for a name and a key, of which the last ``most`` that were made are kept."""
+    known: dict[Hashable, T] = memo(owner, name, dict)
+    if key not in known:
+        while len(known) >= most:
+            known.pop(next(iter(known)))
+        known[key] = make()
+    return known[key]
+
+
+def why_no_rays(body: Any) -> str:
+    """Why a body has no creeping rays, in words; nothing of one that has.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> why_no_rays(sc.Sphere())
+    ''
+    """
+    return str(getattr(body, "without_rays", ""))
+
+
+def is_faceted(body: Any) -> bool:
+    """Whether a body is given by the corners of flat facets."""
+    return bool(why_no_rays(body)) and hasattr(body, "triangles")
+
+
+def inside(body: Any, points: FloatArray) -> BoolArray:
+    """Whether points (m, 3), L, are inside a body of any kind: (m,)."""
+    return np.asarray(body.inside(points) if why_no_rays(body) else body.level(points) < 0)
 
 
 class Compiled(Protocol):

@@ -154,12 +154,7 @@ class Rules:
 
     def nodes(self, body: Surface, cells: int, points: int) -> Any:
         """Nodes of a rule, kept; the last one used stands last."""
-        key = cells, points
-        made = self.rules.pop(key) if key in self.rules else self._make(body, self.mesh(body, cells), points)
-        self.rules[key] = made
-        while len(self.rules) > KEPT:
-            self.rules.pop(next(iter(self.rules)))
-        return made
+        return _kept(self.rules, (cells, points), lambda: self._make(body, self.mesh(body, cells), points))
 
     def mesh(self, body: Surface, cells: int) -> tuple[FloatArray, IntArray]:
         """Vertices and quadrilaterals of a mesh."""
@@ -173,6 +168,14 @@ class Rules:
         if cells not in self._sizes:
             self._sizes[cells] = _Size.of(*self.mesh(body, cells))
         return self._sizes[cells]
+
+
+def _kept(rules: dict[tuple[int, int], Any], key: tuple[int, int], make: Callable[[], Any]) -> Any:
+    """Nodes of a rule, of which `KEPT` are kept; the last one used stands last."""
+    rules[key] = rules.pop(key) if key in rules else make()
+    while len(rules) > KEPT:
+        rules.pop(next(iter(rules)))
+    return rules[key]
 
 
 @dataclass(frozen=True)
@@ -288,13 +291,8 @@ class PieceRules:
 
     def nodes(self, body: Any, rung: int, points: int) -> Any:
         """Nodes of a rule, kept; the last one used stands last."""
-        key = rung, points
         side = float(_sides_of_piece(rung)) * size(body)
-        made = self._rules.pop(key) if key in self._rules else self._make(body, side, points)
-        self._rules[key] = made
-        while len(self._rules) > KEPT:
-            self._rules.pop(next(iter(self._rules)))
-        return made
+        return _kept(self._rules, (rung, points), lambda: self._make(body, side, points))
 
 
 def _rung(share: float) -> int:

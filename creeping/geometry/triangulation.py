@@ -56,12 +56,7 @@ class Triangulation:
     @property
     def components(self) -> int:
         """Number of connected bodies."""
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
-
-        edges = self.triangles[:, [0, 1, 1, 2]].reshape(-1, 2).T
-        n = len(self.vertices)
-        return int(connected_components(coo_array((np.ones(edges.shape[1]), edges), shape=(n, n)))[0])
+        return connected(len(self.vertices), self.triangles[:, [0, 1, 1, 2]].reshape(-1, 2))[0]
 
     @property
     def euler_characteristic(self) -> int:
@@ -70,6 +65,15 @@ class Triangulation:
 
     def __repr__(self) -> str:
         return f"Triangulation({len(self.vertices)} vertices, edge {self.edge_length:.3g} L)"
+
+
+def connected(count: int, pairs: IntArray) -> tuple[int, IntArray]:
+    """Number of connected parts that pairs (k, 2) make of ``count`` things, and the part of each (count,)."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    found, part = connected_components(coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count)), directed=False)
+    return int(found), np.asarray(part)
 
 
 def triangulate(

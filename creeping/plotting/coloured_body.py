@@ -28,9 +28,8 @@ from creeping.field.results.point_result import PointField, SurfaceField
 from creeping.field.waves.surface import scalar_boundary
 from creeping.geometry.checks import unit_of
 from creeping.geometry.incident import PlaneWave
-from creeping.geometry.parts import why_no_rays
 from creeping.geometry.piecewise import drawn_mesh
-from creeping.geometry.surface import Surface, normal, project
+from creeping.geometry.surface import Surface, normal, project, why_no_rays
 from creeping.geometry.triangulation import Triangulation
 from creeping.plotting._drawing import Drawing, View, caption, compose, shadow_view
 from creeping.plotting._strokes import LevelColours, Stroke, chosen_rays

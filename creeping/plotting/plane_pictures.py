@@ -17,7 +17,7 @@ from creeping.errors import InvalidInputError
 from creeping.field.cut_result import FieldCut, grid_points, status_words
 from creeping.field.results.comparison import decibels, shown_range
 from creeping.field.results.point_result import FieldStatus
-from creeping.geometry.parts import inside, why_no_rays
+from creeping.geometry.surface import inside, why_no_rays
 from creeping.plotting import pages
 from creeping.plotting.coloured_body import LEAST_SAMPLES, NOTHING, at_phase
 

@@ -31,9 +31,8 @@ from creeping.geometry.arguments import flag, one_of, real_number, whole_number
 from creeping.geometry.checks import unit_of
 from creeping.geometry.curvature import gaussian_curvature, normal_curvature
 from creeping.geometry.evaluators import speed_of, speed_values
-from creeping.geometry.memo import memo
 from creeping.geometry.piecewise import has_edges, is_piecewise
-from creeping.geometry.surface import Surface, fingerprint, size
+from creeping.geometry.surface import Surface, fingerprint, memo, size
 from creeping.rays.ends import FEW_RAYS, Losses, Starts, ends_of, outline_share
 from creeping.rays.reach import AUTO, HARD_DECAY, IN_RANGE, ray_length
 from creeping.rays.status import AT_CREASES, LAUNCHED, LINE_STATUS, RayStatus

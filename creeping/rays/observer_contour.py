@@ -15,7 +15,7 @@ from scipy.optimize.elementwise import find_root
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.geometry.curvature import bending, second_form
-from creeping.geometry.rows import Rows
+from creeping.geometry.patches import Rows
 from creeping.geometry.surface import Surface, normal, size
 from creeping.rays.quantities import RayPoints
 from creeping.rays.strips import Strip, gather

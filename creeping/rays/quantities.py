@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
-from creeping.geometry.rows import Rows
+from creeping.geometry.patches import Rows
 
 LANES = 18
 """x (3), p (3), J, J', φ, κₙ, κₙ', κₙ'', κ_t, and the five integrals."""

@@ -22,8 +22,7 @@ from creeping.geodesics.states import ATTENUATION, DETACHMENT, END, WHOLE, pack,
 from creeping.geometry.arguments import positive_number, shown
 from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.evaluators import speed_of, speed_values
-from creeping.geometry.memo import memo
-from creeping.geometry.surface import Surface, size
+from creeping.geometry.surface import Surface, memo, size
 from creeping.rays.transport import carried
 from creeping.shadow.attachment import LaunchPoints
 from creeping.shadow.line import ShadowLine, shadow_lines

@@ -18,8 +18,8 @@ import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.geometry.directions import first_of_equals, tangent_frames
+from creeping.geometry.patches import Rows
 from creeping.geometry.quadrature import SYMMETRIC, nearest_points
-from creeping.geometry.rows import Rows
 from creeping.geometry.surface import Surface, normal, project, size
 from creeping.rays.quantities import RayPoints
 from creeping.rays.strips import Strip, gather

@@ -22,8 +22,8 @@ import numpy as np
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geometry.curvature import bending
 from creeping.geometry.directions import first_of_equals, tangent_frames
+from creeping.geometry.patches import Rows
 from creeping.geometry.piecewise import SMOOTH, nearest_crease, pieces_of, tiles_of
-from creeping.geometry.rows import Rows
 from creeping.geometry.surface import Surface, normal, project, size
 from creeping.geometry.triangulation import Triangulation, triangulate
 from creeping.shadow.attachment import occluded

@@ -15,8 +15,7 @@ from scipy.sparse.linalg import splu
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.geometry.incident import headings, openings
-from creeping.geometry.memo import memo
-from creeping.geometry.surface import Surface, normal
+from creeping.geometry.surface import Surface, memo, normal
 from creeping.rays.fan import RayFan
 from creeping.rays.quantities import LANES, START_LANES, RayPoints
 from creeping.rays.tracer import RayTracer

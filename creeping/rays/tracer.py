@@ -22,8 +22,8 @@ from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.pieces import trace_pieces, trace_to
 from creeping.geodesics.states import M11, M12, M21, M22, P, X, pack
 from creeping.geometry.evaluators import evaluators, speed_of
+from creeping.geometry.patches import Rows
 from creeping.geometry.piecewise import is_piecewise, piece_ahead, pieces_of
-from creeping.geometry.rows import Rows
 from creeping.geometry.surface import Surface, size
 from creeping.rays.ends import non_smooth_from
 from creeping.rays.quantities import GAUSS, GUARD, LANES, START_LANES, RayPoints

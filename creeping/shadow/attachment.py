@@ -19,10 +19,9 @@ import numpy as np
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.geometry.incident import REMEDY, headings, openings, optical_paths, spherical
-from creeping.geometry.parts import is_faceted, why_no_rays
+from creeping.geometry.patches import Rows
 from creeping.geometry.piecewise import is_convex, is_piecewise
-from creeping.geometry.rows import Rows
-from creeping.geometry.surface import Surface, size
+from creeping.geometry.surface import Surface, is_faceted, size, why_no_rays
 from creeping.kernels.threads import in_slices
 from creeping.shadow.status import NO_RAY
 

@@ -25,8 +25,8 @@ from creeping.geometry.arguments import checked_body, whole_number
 from creeping.geometry.checks import unit_of
 from creeping.geometry.evaluators import speed_of
 from creeping.geometry.incident import Incident, PointSource, incident_of, plane_direction, rows_of
+from creeping.geometry.patches import Rows
 from creeping.geometry.piecewise import is_piecewise
-from creeping.geometry.rows import Rows
 from creeping.geometry.surface import Surface, normal, size
 from creeping.kernels.threads import in_threads
 from creeping.shadow.arcs import Arcs, Finished, finished

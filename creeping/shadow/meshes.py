@@ -20,8 +20,7 @@ from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geometry.curvature import gaussian_curvature, parabolic_crossings
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.incident import rows_of
-from creeping.geometry.memo import memo
-from creeping.geometry.surface import Surface, normal, project, size
+from creeping.geometry.surface import Surface, memo, normal, project, size
 from creeping.geometry.triangulation import Triangulation, triangulate
 from creeping.kernels.threads import in_slices
 from creeping.shadow.curves import LineNodes

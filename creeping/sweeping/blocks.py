@@ -18,9 +18,8 @@ import numpy as np
 from creeping._progress import EVERY
 from creeping._typing import Any, BoolArray, FloatArray
 from creeping.errors import CreepingError
-from creeping.geometry.parts import why_no_rays
 from creeping.geometry.piecewise import is_piecewise
-from creeping.geometry.surface import Surface
+from creeping.geometry.surface import Surface, why_no_rays
 from creeping.rays.transport import Flow
 from creeping.shadow.status import FAILED
 from creeping.sweeping.results import MISSING, count_attributes, require

@@ -25,9 +25,8 @@ from creeping.field.validity_range import is_reached
 from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geometry.arguments import checked_body, folder_path, real_array, real_number, shown, whole_number
 from creeping.geometry.directions import azimuth_elevation_of, directions_from_azimuth_elevation
-from creeping.geometry.parts import why_no_rays
 from creeping.geometry.piecewise import is_piecewise
-from creeping.geometry.surface import Surface, size
+from creeping.geometry.surface import Surface, size, why_no_rays
 from creeping.phaseflow.tuning.request import choose_flow
 from creeping.rays.fan import launch
 from creeping.rays.reach import body_length

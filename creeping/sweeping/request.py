@@ -18,8 +18,7 @@ from creeping.field.routes import by_equation_alone
 from creeping.geometry.arguments import real_array
 from creeping.geometry.directions import unit_directions
 from creeping.geometry.evaluators import speed_of
-from creeping.geometry.parts import why_no_rays
-from creeping.geometry.surface import Surface
+from creeping.geometry.surface import Surface, why_no_rays
 from creeping.rays.reach import AUTO, asked_length, body_length
 from creeping.shadow.status import FAILED, INCIDENCE_STATUSES
 from creeping.sweeping.lattice import Lattice, lattice_of

@@ -17,8 +17,7 @@ from creeping.errors import CreepingError, InvalidInputError
 from creeping.field.boundary import BoundaryLike
 from creeping.geometry.arguments import flag, folder_path, rays_refused, shown, whole_number
 from creeping.geometry.directions import unit_directions
-from creeping.geometry.parts import why_no_rays
-from creeping.geometry.surface import Surface
+from creeping.geometry.surface import Surface, why_no_rays
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.rays.reach import AUTO
 from creeping.rays.transport import Flow, checked_flow

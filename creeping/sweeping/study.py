@@ -10,8 +10,7 @@ from typing import Literal
 
 from creeping._typing import Any, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.geometry.parts import why_no_rays
-from creeping.geometry.surface import Surface, size
+from creeping.geometry.surface import Surface, size, why_no_rays
 from creeping.rays.reach import AUTO
 from creeping.storage.atomic import text_of
 from creeping.sweeping.plan import too_large

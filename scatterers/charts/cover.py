@@ -20,7 +20,7 @@ from scipy.sparse import coo_array
 from scipy.spatial import cKDTree
 
 from creeping._typing import BoolArray, FloatArray, IntArray
-from scatterers.kernels.monge import CHART, FIRST
+from scatterers.kernels.charts import CHART, FIRST
 
 Field = Callable[[FloatArray], FloatArray]
 STEPS = (0.3, 0.55, 0.75, 0.9, 1.0)
@@ -241,7 +241,7 @@ class _Candidates:
 
     def add(self, start: IntArray, longest: FloatArray) -> None:
         """Charts about points of the cloud, half widths ``longest`` at most."""
-        from scatterers.kernels.monge import grow
+        from scatterers.kernels.charts import grow
 
         cloud = self.cloud
         normals = np.ascontiguousarray(cloud.axes[:, 2])
@@ -372,7 +372,7 @@ def covered_by(
 
 
 def _located(candidates: _Candidates, graphs: MongeCharts, which: list[int]) -> FloatArray:
-    """Parameters of the locator of these charts, as `scatterers.kernels.monge` orders them.
+    """Parameters of the locator of these charts, as `scatterers.kernels.charts` orders them.
 
     Each voxel lists the charts that suit the points of the body in it best, or nearly so.
     """

@@ -22,10 +22,10 @@ from functools import cached_property
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
-from scatterers.cached import cached
+from scatterers.body import cached
 from scatterers.charts.cover import Field, MongeCharts, covered_by, probes
+from scatterers.kernels.charts import CHART, FIRST, LEAN, OUTSIDE, VOXELS
 from scatterers.kernels.compiled import Compiled, call
-from scatterers.kernels.monge import CHART, FIRST, LEAN, OUTSIDE, VOXELS
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class MongeAtlas:
     ----------
     graphs : MongeCharts
     parameters : (k,)
-        Charts and table of voxels, as `scatterers.kernels.monge` orders them.
+        Charts and table of voxels, as `scatterers.kernels.charts` orders them.
     """
 
     graphs: MongeCharts
@@ -163,9 +163,9 @@ class MongeAtlas:
     @cached_property
     def compiled(self) -> Compiled:
         """Compiled locator."""
-        from scatterers.kernels.monge import locate
+        from scatterers.kernels.charts import locate_graph
 
-        return Compiled(locate, "locator", self.parameters)
+        return Compiled(locate_graph, "locator", self.parameters)
 
 
 def _checked(cloud: FloatArray) -> FloatArray:

@@ -28,7 +28,6 @@ from scatterers.triangles.regions import curves
 from scatterers.triangles.topology import cut, edges_of
 
 NEWTON = 20
-HALVINGS = 50
 SHALLOW = 1e-3
 """Angle between normals, radians, below which both levels together do not tell the place."""
 EDGE, JUMP = 1e-5, 1e-6
@@ -111,7 +110,7 @@ def _on_both(
     far = np.linalg.norm(found - middle, axis=-1) > np.max(np.linalg.norm(b - a, axis=-1), initial=0.0)
     halved = (~steep | far) & (ka != kb)
     low, high, first = a[halved], b[halved], ka[halved]
-    for _ in range(HALVINGS):
+    for _ in range(np.finfo(float).nmant):
         at = towards(body.compiled, 0.5 * (low + high), 3)
         same = (numbers(at) == first)[:, None]
         low, high = np.where(same, at, low), np.where(same, high, at)
@@ -235,7 +234,7 @@ def march(level: Field, box: FloatArray, spacing: float) -> tuple[FloatArray, In
     )
     # by halving: F is continuous only
     low, high = np.zeros(len(pairs)), np.ones(len(pairs))
-    for _ in range(HALVINGS):
+    for _ in range(np.finfo(float).nmant):
         middle = 0.5 * (low + high)
         within = level(inner + middle[:, None] * (outer - inner)) < 0
         low, high = np.where(within, middle, low), np.where(within, high, middle)

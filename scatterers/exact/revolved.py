@@ -32,10 +32,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from creeping._typing import FloatArray, IntArray
-from scatterers.body import SHARP, Body, Crease, Levelled, NoCharts, Piece, no_charts, positive
-from scatterers.cached import cached
-from scatterers.charts.radial import RadialMap, Spine
-from scatterers.charts.star import CubeSphereAtlas
+from scatterers.body import SHARP, Body, Crease, Levelled, NoCharts, Piece, cached, no_charts, positive
+from scatterers.charts.star import CubeSphereAtlas, RadialMap, Spine
 from scatterers.exact.profile import Segment
 from scatterers.kernels.compiled import Compiled, evaluated
 from scatterers.kernels.revolved import ROWS, SPLINE, WIDTH, evaluate, numbers, value_and_gradient
@@ -393,7 +391,7 @@ def strip(lower: int, upper: int) -> tuple[IntArray, IntArray]:
 
 @dataclass(frozen=True, eq=False)
 class RevolvedSpace:
-    """F of a body of revolution in a box; satisfies `scatterers.charts.radial.SpaceLevel`.
+    """F of a body of revolution in a box; satisfies `scatterers.charts.star.SpaceLevel`.
 
     Attributes
     ----------
@@ -407,7 +405,7 @@ class RevolvedSpace:
 
     def flat(self, of_map: FloatArray) -> FloatArray:
         """Parameters of the compiled functions: a grid of one cell, those of a map, those of the body."""
-        from scatterers.kernels.sphere_maps import one_cell
+        from scatterers.kernels.charts import one_cell
 
         return self.packed(one_cell(self.box, of_map))
 
@@ -420,6 +418,6 @@ class RevolvedSpace:
 @cache
 def _forward() -> Callable[..., None]:
     """The sphere map's function on this level, the same object at every call."""
-    from scatterers.kernels.sphere_maps import forward_over
+    from scatterers.kernels.charts import forward_over
 
     return forward_over(value_and_gradient, "body of revolution")

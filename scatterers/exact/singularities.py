@@ -13,6 +13,7 @@ from creeping._typing import FloatArray
 from scatterers.charts.samples import Samples, towards
 from scatterers.exact.switches import ExpressionSpace
 from scatterers.kernels.compiled import SYMMETRIC, Compiled, evaluated
+from scatterers.triangles.topology import components
 
 SINGULAR = 1e-6
 """|grad F| on the body, relative to its median there, below which a point is singular."""
@@ -164,8 +165,6 @@ def polished(compiled: Compiled, place: FloatArray, size: float) -> FloatArray:
 
 def is_tip(compiled: Compiled, place: FloatArray, size: float) -> bool:
     """Whether the body ends at a place (3,), L, like a cone at its tip, or has a dent like one."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     # equal areas along a spiral
@@ -182,9 +181,7 @@ def is_tip(compiled: Compiled, place: FloatArray, size: float) -> bool:
             rows = np.repeat(np.flatnonzero(part), near.shape[1])
             columns = near[part].ravel()
             kept = part[columns]
-            graph = coo_matrix((np.ones(kept.sum()), (rows[kept], columns[kept])), shape=(AROUND, AROUND))
-            labels = connected_components(graph, directed=False)[1]
-            if len(np.unique(labels[part])) != 1:
+            if len(np.unique(components(AROUND, rows[kept], columns[kept])[1][part])) != 1:
                 return False
     # of a cusp the share falls with the radius
     return min(shares) > 0.7 * max(shares)

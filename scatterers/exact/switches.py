@@ -155,7 +155,7 @@ def compiled_piece(text: str, made: tuple[int, ...], kind: Kind, parameters: Flo
 
 @dataclass(frozen=True, eq=False)
 class ExpressionSpace:
-    """F of an expression in a box; satisfies `scatterers.charts.radial.SpaceLevel`.
+    """F of an expression in a box; satisfies `scatterers.charts.star.SpaceLevel`.
 
     Attributes
     ----------
@@ -173,7 +173,7 @@ class ExpressionSpace:
 
     def flat(self, of_map: FloatArray) -> FloatArray:
         """Parameters of the compiled functions: a grid of one cell and those of a map."""
-        from scatterers.kernels.sphere_maps import one_cell
+        from scatterers.kernels.charts import one_cell
 
         return one_cell(self.box, of_map)
 
@@ -186,7 +186,7 @@ class ExpressionSpace:
 @lru_cache(maxsize=64)
 def _sources(expression: str) -> dict[str, Callable[..., None]]:
     """The level and the sphere map's function on the expression, the same objects at every call."""
-    from scatterers.kernels.sphere_maps import forward_over
+    from scatterers.kernels.charts import forward_over
 
     forward = forward_over(differentiate(expression).first, "expression")
     forward.again = compiled_forward, expression  # type: ignore[attr-defined]

@@ -8,9 +8,8 @@ import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.body import Crease, Piece
-from scatterers.charts.level_body import LevelBody
 from scatterers.charts.samples import Samples
-from scatterers.charts.star import star_map
+from scatterers.charts.star import LevelBody, star_map
 from scatterers.fits import cache as _fit_cache
 from scatterers.fits.cloud import FitReport, PieceCloud, PointCloud
 from scatterers.fits.pieces import fitted_pieces
@@ -28,9 +27,7 @@ SLACK = 0.02
 """Of the box about a body of pieces, in its largest side."""
 SURFACES = ("smooth", "facets", "auto")
 OF_FACETS = ("part", "cap", "union", "progress")
-"""Options that a body on its facets has as well,"""
-OF_ALL = ("cache",)
-"""and those that mean nothing there."""
+"""Options that a body on its facets has as well."""
 Progress = Callable[[str], None]
 Kept = tuple[Path, str, dict[str, FloatArray], dict[str, Any]]
 
@@ -135,7 +132,7 @@ class FittedBody(SplineBody):
         from scatterers.facets import Facets
 
         shared = {name: options[name] for name in OF_FACETS if name in options}
-        only = [name for name, value in options.items() if value and name not in (*OF_FACETS, *OF_ALL)]
+        only = [name for name, value in options.items() if value and name not in (*OF_FACETS, "cache")]
         if surface == "facets":
             if only:
                 raise ValueError(f"{only[0]} is of a smooth surface; leave it out of one on its facets")

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
-from scatterers.fits.patch import Closeness, Patch, polynomial_patch
+from scatterers.fits.patch import TIP, Closeness, Patch, polynomial_patch, second_order
 from scatterers.triangles.jets import angle_weighted_normals
 from scatterers.triangles.topology import components, cut, edges_of, flat_normals
 
@@ -40,20 +40,10 @@ FEWEST = 40
 """Vertices of a part that is known well enough to be taken for a quadric: a quadric has 9 numbers."""
 FEWEST_NOISY = 100
 """The same of vertices with noise: no fewer tell it from a surface whose curvature varies a little."""
-DETERMINED = 12
-"""Vertices of a narrow part between others that are."""
-NOISE = 2.0
-"""Distance within which a quadric holds vertices, in the largest of those that it was fitted to."""
 MOST = 2000
 """Vertices that a quadric is fitted to at first."""
-TRIES = 20
-"""Places at which no quadric is found until it is believed that there is none."""
 ROUNDS = 12
 """Times that a quadric is fitted again to all that it holds."""
-TIPS, NEARLY = 100, 100.0
-"""Vertices that may be tips, and their distance in that within which others are held: Q changes with its square."""
-STEEP = 1e-3
-"""Slope of a quadric, relative to the median, below which it has no normal: the tip of a cone."""
 
 
 class Sheet:
@@ -62,20 +52,19 @@ class Sheet:
     def __init__(self, patch: Patch, points: FloatArray, close: Closeness) -> None:
         self.spline = patch.fine
         self.bend = float(np.linalg.norm(self.spline.hessian(points[:1])[0]))
-        self.tolerance = max(close.most, NOISE * float(np.max(self.off(points))))
+        self.tolerance = close.most
 
     def off(self, x: FloatArray) -> FloatArray:
         """Distance (n,) of points (n, 3) from it, of second order: at the tip of a cone it has no slope."""
         value, gradient = self.spline.value_and_gradient(x)
-        slope = np.linalg.norm(gradient, axis=1)
-        return np.asarray(2 * np.abs(value) / (slope + np.sqrt(slope**2 + 2 * self.bend * np.abs(value)) + 1e-300))
+        return second_order(value, np.linalg.norm(gradient, axis=1), self.bend)
 
     def normals(self, x: FloatArray) -> FloatArray:
         """Outward normals (n, 3) at points (n, 3); 0 where there is none."""
         gradient = self.spline.gradient(x)
         slope = np.linalg.norm(gradient, axis=1, keepdims=True)
         # the slope is 1 in the median
-        return np.where(slope > STEEP, gradient / np.maximum(slope, 1e-300), 0.0)
+        return np.where(slope > TIP, gradient / np.maximum(slope, 1e-300), 0.0)
 
 
 def sheets_of(
@@ -88,7 +77,7 @@ def sheets_of(
     sheets: list[Sheet] = []
     held = np.zeros((n, 0), dtype=bool)
     close, fewest = Closeness.of(size, noise), FEWEST_NOISY if noise else FEWEST
-    tree, tries = cKDTree(vertices), 0
+    tree = cKDTree(vertices)
     while True:
         left = clean & ~held.any(axis=1)
         if np.sum(left) < fewest:
@@ -106,19 +95,12 @@ def sheets_of(
         while found is None and len(near) >= fewest:
             found = _grown(vertices, normals, ends, near, seed, close, fewest)
             near = near[: len(near) // 2]
-        if found is None:
-            # it is next to a joint, or on no quadric
-            tries += 1
-            if tries == TRIES:
-                return [], held
-            clean = clean.copy()
-            clean[tree.query(vertices[seed], fewest)[1]] = False
-            continue
-        if found[1].all():
+        # on no quadric, or on one alone
+        if found is None or found[1].all():
             return [], held
         sheets.append(found[0])
         held = np.column_stack([held, found[1]])
-    return sheets, _with_tips(vertices, ends, held, sheets)
+    return sheets, held
 
 
 def _grown(
@@ -148,17 +130,6 @@ def _grown(
     return None if sheet is None or held.sum() < fewest else (sheet, held)
 
 
-def _with_tips(vertices: FloatArray, ends: IntArray, held: BoolArray, sheets: list[Sheet]) -> BoolArray:
-    """What sheets hold, with vertices that none holds among neighbours that one holds, nearly: tips of cones."""
-    for vertex in np.flatnonzero(~held.any(axis=1))[:TIPS].tolist():
-        beside = ends[(ends == vertex).any(axis=1)]
-        beside = beside[beside != vertex]
-        for k, sheet in enumerate(sheets):
-            if held[beside, k].all() and sheet.off(vertices[vertex : vertex + 1])[0] < NEARLY * sheet.tolerance:
-                held[vertex, k] = True
-    return held
-
-
 def with_narrow(
     vertices: FloatArray, triangles: IntArray, ends: IntArray, held: BoolArray, sheets: list[Sheet], close: Closeness
 ) -> tuple[list[Sheet], BoolArray]:
@@ -169,7 +140,7 @@ def with_narrow(
     label, normals = _parts(len(vertices), ends, left), angle_weighted_normals(vertices, triangles)
     for part in np.unique(label[left]):
         some = np.flatnonzero(left & (label == part))
-        patch = polynomial_patch(vertices[some], normals[some], close) if len(some) >= DETERMINED else None
+        patch = polynomial_patch(vertices[some], normals[some], close)
         if patch is not None:
             sheet = Sheet(patch, vertices[some], close)
             on = np.asarray(sheet.off(vertices) <= sheet.tolerance)
@@ -337,7 +308,7 @@ def _across(
             # on the joint both are 0
             for sheet in (first, second):
                 value, gradient = sheet.spline.value_and_gradient(x)
-                x = x - (value / np.maximum(np.sum(gradient**2, axis=1), STEEP))[:, None] * gradient
+                x = x - (value / np.maximum(np.sum(gradient**2, axis=1), TIP))[:, None] * gradient
         return x
 
     def turn(x: FloatArray) -> FloatArray:

@@ -39,9 +39,9 @@ OUTLIER, EVENLY = 5.0, 1.4
 CLOSE = 2e-4
 LEAN = 0.35
 """Angle between the normals of triangles and a quadric through their corners, radians."""
-SLIGHT, FEW = 0.1, 0.3
+SLIGHT = 0.1
 """Of the median slope of a quadric: with less, as next to the tip of a cone, it turns much within a triangle, and
-normals need only be on the same side; and the largest share of such points."""
+normals need only be on the same side."""
 TIP = 1e-3
 """Of the median slope: with less there is no normal to compare. Also the share of a piece's size by which the sheets of
 a cone may miss their tip."""
@@ -51,8 +51,8 @@ SPACING, BETWEEN, NODES = 1.8, 1.1, 4e5
 """Grid of a spline in units of the distance of points, of those with others between them, and its most nodes."""
 STEPS = 300
 """Of a fit: the borders of a piece take long, and gain little."""
-CLOSELY, ROUGHLY = ACCURACY, 3e-4
-"""Change of the curvatures at which fits stop: from jets, and from points of curved triangles, which err by more."""
+ROUGHLY = 3e-4
+"""Change of the curvatures at which fits to points of curved triangles stop, which err by more than jets."""
 MOST = 4_000_000
 """Triangles of a mesh that is made."""
 
@@ -92,7 +92,7 @@ def spline_patch(
     if jets is not None and triangles is not None:
         more, there = centroids(points, triangles, jets)
         distance = partial(signed_distance, points, jets)
-        accuracy, cells = CLOSELY, BETWEEN
+        accuracy, cells = ACCURACY, BETWEEN
         mean = np.concatenate([np.where(jets.fitted, jets.mean, np.nan), np.full(len(more), np.nan)])
         points, normals = np.concatenate([points, more]), np.concatenate([normals, there])
     grid = max(cells * spacing, spacing_of(points, NODES))
@@ -164,16 +164,19 @@ def polynomial_through(
         if np.median(lean) < 0:
             f, g, lean, q = -f, -g, -lean, -q
         bend = _bend(q, powers)
-        # the nearest point with Q = 0, of second order: next to the tip of a cone there is no slope to divide by
-        off = 2 * np.abs(f) / (steep + np.sqrt(steep**2 + 2 * bend * np.abs(f)) + 1e-300) * half
+        off = second_order(f, steep, bend) * half
         # a quadric may be a pair of sheets, of which the points take one
         curved = CLOSE * bend / float(np.median(steep)) * half / 8 if kind == "quadric" else 0.0
         slope = steep / np.median(steep)
         least = np.select([slope > SLIGHT, slope > TIP], [np.cos(LEAN), 0.0], -1.0)
-        few = np.mean(slope <= SLIGHT) < FEW and np.sum(slope <= TIP) <= 1
-        if np.all(off <= max(tolerance, curved)) and np.all(lean >= least) and few:
+        if np.all(off <= max(tolerance, curved)) and np.all(lean >= least) and np.sum(slope <= TIP) <= 1:
             return _as_spline(q / np.median(steep), powers, middle, half), kind, float(np.sqrt(np.mean(off**2)))
     return None
+
+
+def second_order(value: FloatArray, slope: FloatArray, bend: float) -> FloatArray:
+    """Distance (n,) from Q = 0 by Q, |grad Q| and |Q''|; next to the tip of a cone there is no slope to divide by."""
+    return np.asarray(2 * np.abs(value) / (slope + np.sqrt(slope**2 + 2 * bend * np.abs(value)) + 1e-300))
 
 
 def _least(value: FloatArray, slope: FloatArray, normals: FloatArray) -> FloatArray:

@@ -38,6 +38,7 @@ from scatterers.fits.patch import (
     curved,
     divided,
     polynomial_patch,
+    second_order,
     spline_patch,
     tip_of,
 )
@@ -394,9 +395,7 @@ def _lies_on(patch: Patch, corners: FloatArray, flat: FloatArray, tolerance: flo
     """Whether triangles (m, 3, 3) with normals (m, 3) lie on a quadric by their corners, and face along its slope."""
     value, gradient = patch.fine.value_and_gradient(corners.reshape(-1, 3))
     slope = np.linalg.norm(gradient, axis=1)
-    bend = float(np.linalg.norm(patch.fine.hessian(corners[:1, 0])))
-    # of second order, as next to a tip there is no slope
-    off = 2 * np.abs(value) / (slope + np.sqrt(slope**2 + 2 * bend * np.abs(value)) + 1e-300)
+    off = second_order(value, slope, float(np.linalg.norm(patch.fine.hessian(corners[:1, 0]))))
     along = np.sum(patch.fine.gradient(corners.mean(axis=1)) * flat, axis=1) > 0
     # the slope is 1 in the median; a triangle at a tip may reach around it, and the tip is known less well
     at_tip = slope.reshape(-1, 3).min(axis=1) < SLIGHT

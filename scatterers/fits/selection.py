@@ -24,7 +24,7 @@ import numpy as np
 
 from creeping._typing import FloatArray, IntArray
 from scatterers.body import Crease
-from scatterers.fits.tensor import TensorSpline
+from scatterers.fits.tensor import TensorSpline, side_of_cells
 from scatterers.kernels.compiled import Compiled, evaluated
 from scatterers.kernels.tensor import BESIDES, CENTRE, HEADER, LARGER, MOST_PIECES, SMALLER, TABLES
 
@@ -129,13 +129,7 @@ def _sound(program: FloatArray, count: int) -> bool:
 
 def voxel_side(box: FloatArray) -> float:
     """Side of the voxels about a body in its box (2, 3), L."""
-    side = box[1] - box[0]
-    low, high = 0.0, float(side.max())
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        fewer = np.prod(side / middle + 2 * MARGIN) < VOXELS
-        low, high = (low, middle) if fewer else (middle, high)
-    return high
+    return side_of_cells(box[1] - box[0], 2 * MARGIN, VOXELS)
 
 
 def piece_space(

@@ -17,12 +17,6 @@ raised by a floor. Steps are few if they start from a good distance: those left 
 hardly see.
 
 Weights are set by trial; Derivations, B6.
-
-Also here: fourth differences along the axes of a grid, as the bands of D^T D, and where their sum is wanted.
-
-D takes c to c_k - 4 c_(k+1) + 6 c_(k+2) - 4 c_(k+3) + c_(k+4); near the ends of an axis D^T D has rows of its own.
-
-Sources: Derivations, B6.
 """
 
 from collections.abc import Callable
@@ -32,7 +26,7 @@ import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.fits.cloud import left_at, tangents
-from scatterers.fits.tensor import Cardinal, TensorSpline
+from scatterers.fits.tensor import TensorSpline, cardinal, side_of_cells
 from scatterers.kernels.compiled import SYMMETRIC, evaluated
 from scatterers.kernels.tensor import OVERREAD
 
@@ -52,6 +46,8 @@ NEAR = 7.0
 AWAY = 1.2
 """Cells from the points within which parts of either sign come that the body bounds."""
 QUASI = np.array([13, -112, 438, -112, 13]) / 240
+ROUGHNESS = np.convolve([1, -4, 6, -4, 1], [1, -4, 6, -4, 1])
+"""D^T D away from the ends of an axis, D the fourth differences."""
 COARSER = 1.35
 """Spacing of the grid of a second fit, in units of the first."""
 SLOPES = (0.5, 1.6)
@@ -157,7 +153,7 @@ def fit(
         step = -rz / _product(p, q)
         c += np.multiply(p, step, out=part)
         r += np.multiply(q, step, out=part)
-        equations.preconditioned(r, out=z)
+        z = equations.preconditioned(r)
         last, rz = rz, _product(r, z)
         p *= rz / last
         p += z
@@ -187,13 +183,7 @@ def _product(a: FloatArray, b: FloatArray) -> float:
 
 def spacing_of(points: FloatArray, nodes: float) -> float:
     """Spacing at which the grid about points (n, 3) has so many nodes, L."""
-    side = np.ptp(points, axis=0)
-    low, high = 0.0, float(side.max())
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        fewer = np.prod(side / middle + 2 * PADDING + 5) < nodes
-        low, high = (low, middle) if fewer else (middle, high)
-    return high
+    return side_of_cells(np.ptp(points, axis=0), 2 * PADDING + 5, nodes)
 
 
 class _Equations:
@@ -232,10 +222,8 @@ class _Equations:
         self.nothing, self.flat = np.zeros(len(places)), np.zeros_like(places)
         self.targets = [self.nothing, *(self._offset_targets(k) for k in (1, -1))]
         self.unknown = self._seen()
-        self.bands, self.ranges = fourth_bands(self.shape), ranges(self.unknown)
         density = self._density()
-        # 70 is the square sum of a fourth difference's weights
-        self.cardinal = Cardinal(1 / (density + FLOOR * density.max() + 210 * smoothing))
+        self.damping = 1 / (density + FLOOR * density.max() + 3 * ROUGHNESS.max() * smoothing)
 
     def _nearest(self, where: FloatArray) -> IntArray:
         """Points nearest to all nodes (m, 3), but for some spacings where they are many spacings off.
@@ -311,7 +299,9 @@ class _Equations:
         self, c: FloatArray, *, targets: bool, rough: bool = True, out: FloatArray | None = None
     ) -> FloatArray:
         """A^T W (b - A c) less the smoothing's gradient if rough, b = 0 unless targets; zero where c is not unknown."""
-        from scatterers.kernels.least_squares import accumulate, subtract_roughness
+        from scipy.ndimage import convolve1d
+
+        from scatterers.kernels.tensor import accumulate
 
         out = np.empty_like(c) if out is None else out
         out.fill(0.0)
@@ -321,17 +311,18 @@ class _Equations:
             slopes = self.sorted_normals if targets and not k else self.flat
             accumulate(places, values if targets else self.nothing[: len(places)], slopes, weight, shape, c, out)
         if rough:
-            subtract_roughness(self.smoothing, shape, self.ranges, self.bands, c, out)
+            # what is unknown keeps four nodes from the ends
+            grid = c[:-OVERREAD].reshape(self.shape)
+            bent = sum(convolve1d(grid, ROUGHNESS, axis, mode="constant") for axis in range(3))
+            out[:-OVERREAD] -= self.smoothing * np.ravel(bent)
         out[:-OVERREAD] *= self.unknown.ravel()
         out[-OVERREAD:] = 0.0
         return out
 
-    def preconditioned(self, r: FloatArray, out: FloatArray | None = None) -> FloatArray:
+    def preconditioned(self, r: FloatArray) -> FloatArray:
         """S D^-1 S r on the unknown coefficients."""
-        out = np.empty_like(r) if out is None else out
-        out[-OVERREAD:] = 0.0
-        self.cardinal(r[:-OVERREAD].reshape(self.shape), self.unknown, out[:-OVERREAD].reshape(self.shape))
-        return out
+        values = cardinal(cardinal(r[:-OVERREAD].reshape(self.shape)) * self.damping) * self.unknown
+        return np.concatenate([values.ravel(), np.zeros(OVERREAD)])
 
     def _seen(self) -> BoolArray:
         """Coefficients that some sample sees."""
@@ -393,27 +384,3 @@ class _Watch:
         if not self.guided:
             return 0.0
         return float(np.sqrt(np.mean((curvatures.mean(axis=0) - self.guide) ** 2)))
-
-
-def fourth_bands(shape: tuple[int, ...]) -> FloatArray:
-    """Bands (9, sum of the shape) of D^T D, D the fourth differences along an axis, from below to above the diagonal.
-
-    Examples
-    --------
-    >>> fourth_bands((9,))[:, 4]
-    array([  1.,  -8.,  28., -56.,  70., -56.,  28.,  -8.,   1.])
-    """
-    parts = []
-    for n in shape:
-        difference = np.diff(np.eye(n), n=4, axis=0)
-        gram = np.pad(difference.T @ difference, ((0, 0), (4, 4)))
-        parts.append(np.stack([gram[np.arange(n), np.arange(n) + s] for s in range(9)]))
-    return np.ascontiguousarray(np.concatenate(parts, axis=1))
-
-
-def ranges(unknown: BoolArray) -> IntArray:
-    """First number and the one behind the last (rows, 2) of what is unknown in rows along the last axis; 0, 0: none."""
-    rows = unknown.reshape(-1, unknown.shape[-1])
-    found = np.stack([rows.argmax(axis=1), rows.shape[1] - rows[:, ::-1].argmax(axis=1)], axis=1)
-    found[~np.any(rows, axis=1)] = 0
-    return found.astype(np.int64)

@@ -8,10 +8,6 @@ n nodes carrying n + 4 coefficients. Ends are not-a-knot, so quintics are reprod
 the grid the outermost cell's polynomial goes on for one cell; from there on t is held. A NaN stays one.
 `scatterers.kernels.tensor` evaluates it.
 
-Also here: from values at the nodes of a grid to coefficients of quintic B-splines there: S = B^-1 along each axis.
-
-B has the bands (1, 26, 66, 26, 1)/120, and is factored once for each axis.
-
 Sources: [B78]; Derivations, B7 and B6.
 """
 
@@ -21,10 +17,23 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from creeping._typing import BoolArray, FloatArray
+from creeping._typing import FloatArray
 from scatterers.body import Levelled
 from scatterers.kernels.compiled import Compiled, evaluated
 from scatterers.kernels.tensor import CENTRE, HEADER, OVERREAD
+
+NODAL = np.array([1, 26, 66, 26, 1]) / 120
+"""A B-spline at the nodes."""
+
+
+def side_of_cells(box: FloatArray, more: float, most: float) -> float:
+    """Side at which a box (3,), L, with ``more`` cells along each axis has so many of them at most."""
+    low, high = 0.0, float(box.max())
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        fewer = np.prod(box / middle + more) < most
+        low, high = (low, middle) if fewer else (middle, high)
+    return high
 
 
 @cache
@@ -36,10 +45,30 @@ def interpolation_operator(n: int) -> FloatArray:
     """
     conditions = np.zeros((n + 4, n + 4))
     for node in range(n):
-        conditions[node, node : node + 5] = np.array([1, 26, 66, 26, 1]) / 120
+        conditions[node, node : node + 5] = NODAL
     for row, knot in enumerate((1, 2, n - 3, n - 2), n):
         conditions[row, knot - 1 : knot + 6] = np.array([1, -6, 15, -20, 15, -6, 1]) / 64
     return np.asarray(np.linalg.solve(conditions, np.eye(n + 4, n)))
+
+
+@cache
+def cardinal_factor(n: int) -> FloatArray:
+    """Bands (3, n) of Cholesky's factor, by columns from its diagonal on, of B, the samples of n B-splines there."""
+    from scipy.linalg import cholesky_banded
+
+    return np.ascontiguousarray(cholesky_banded(np.outer(NODAL[2:], np.ones(n)), lower=True))
+
+
+def cardinal(values: FloatArray) -> FloatArray:
+    """S = B^-1 along each axis, of values at the nodes (n0, n1, n2), without coefficients beyond these."""
+    from scatterers.kernels.tensor import solve
+
+    for _ in range(3):
+        # each axis comes first once
+        values = np.array(values, order="C")
+        solve(cardinal_factor(len(values)), values.reshape(len(values), -1))
+        values = values.transpose(1, 2, 0)
+    return values
 
 
 def coefficients(samples: FloatArray) -> FloatArray:
@@ -75,8 +104,7 @@ class TensorSpline(Levelled):
         values = self.coefficients
         for axis in range(3):
             nodes = values.shape[axis] - 4
-            shifted = [w * np.take(values, range(k, k + nodes), axis) for k, w in enumerate((1, 26, 66, 26, 1))]
-            values = np.sum(shifted, axis=0) / 120
+            values = np.sum([w * np.take(values, range(k, k + nodes), axis) for k, w in enumerate(NODAL)], axis=0)
         return values
 
     def value_and_gradient(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -90,8 +118,8 @@ class TensorSpline(Levelled):
 
     @property
     def sources(self) -> dict[str, Callable[..., None]]:
-        """Plain Python of the compiled functions; see `scatterers.charts.radial.SpaceLevel`."""
-        from scatterers.kernels.sphere_maps import forward
+        """Plain Python of the compiled functions; see `scatterers.charts.star.SpaceLevel`."""
+        from scatterers.kernels.charts import forward
         from scatterers.kernels.tensor import evaluate
 
         return {"level": evaluate, "forward": forward}
@@ -100,40 +128,3 @@ class TensorSpline(Levelled):
     def compiled(self) -> Compiled:
         """Compiled evaluator."""
         return Compiled(self.sources["level"], "level", self.flat(np.zeros(HEADER - CENTRE)))
-
-
-class Cardinal:
-    """S D S on grids of one shape, D a number of each node; symmetric, as B is.
-
-    Examples
-    --------
-    >>> one = np.ones((7, 8, 9))
-    >>> Cardinal(one)(one, one > 0, np.empty((7, 8, 9))).shape
-    (7, 8, 9)
-    """
-
-    def __init__(self, damping: FloatArray) -> None:
-        self.factors = [_factors(n) for n in damping.shape]
-        # as the kernel takes it
-        self.damping = np.ascontiguousarray(np.swapaxes(damping, 1, 2))
-        self.work = np.empty_like(self.damping)
-
-    def __call__(self, values: FloatArray, wanted: BoolArray, out: FloatArray) -> FloatArray:
-        """Out, filled with S D S of values where wanted, else with zero, as values are to be there."""
-        from scatterers.kernels.tensor import twice
-
-        twice(values, self.damping, wanted, *self.factors, self.work, out)
-        return out
-
-
-def _factors(n: int) -> FloatArray:
-    """Bands of L, one and two below the diagonal, and 1/d of B = L diag(d) L^T for n nodes: (3, n)."""
-    edge, near, middle = np.array([1, 26, 66]) / 120
-    found = np.zeros((3, n))
-    for i in range(n):
-        # what the two rows before take of this one
-        far = edge * found[2, i - 2] if i > 1 else 0.0
-        left = near - (edge * found[0, i - 1] if i > 1 else 0.0) if i else 0.0
-        found[:2, i] = left * found[2, i - 1], far
-        found[2, i] = 1 / (middle - left * found[0, i] - edge * far)
-    return found

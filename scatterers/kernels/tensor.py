@@ -7,13 +7,7 @@ numba.
 
 Also here: constants that the quintic spline and the radial map over it share.
 
-Compiled S D S of a grid, S from values at nodes to coefficients of B-splines; see `scatterers.fits.tensor`.
-
-B = L diag(d) L^T along each axis, L with ones on its diagonal and two bands below it: S takes a sweep down and one up,
-x_i - l_i x_(i-1) - m_i x_(i-2), then x_i/d_i - l_(i+1) x_(i+1) - m_(i+2) x_(i+2). The axes commute, so S D S takes
-three passes over the grid, of slabs that stay in the cache: the last two axes; the first one, D, the first one; the
-last two. In between the last two axes are exchanged, so that every sweep takes whole rows at a time.
-Factors are (3, n): l, m and 1/d. Importing this module imports numba.
+Also here: the compiled normal equations of a least-squares fit; see `scatterers.fits.solver`.
 
 Also here: compiled level of a body of pieces, each a quintic tensor-product B-spline; see `scatterers.fits.selection`.
 
@@ -72,8 +66,6 @@ BEYOND = 1.0
 ITERATIONS = 60
 # a Newton step this small, relative to the radius, leaves an error below rounding
 SMALL = 1e-8
-TILE = 8
-"""Rows exchanged at a time."""
 
 
 _double, _index, _lane = ir.DoubleType(), ir.IntType(64), ir.IntType(32)
@@ -271,87 +263,44 @@ evaluate.operations = 1250.0  # type: ignore[attr-defined]
 
 
 @njit(cache=True, nogil=True, **OPTIONS)
-def twice(values, damping, wanted, first, second, third, work, out):  # type: ignore[no-untyped-def]
-    """Fill out (nx, ny, nz) with S (D S values) where wanted, else zero.
+def accumulate(places, values, slopes, weights, shape, c, out):  # type: ignore[no-untyped-def]
+    """Add A^T W (b - A c) to out; returns (b - A c)^T W (b - A c).
 
-    Values, zero where they are not wanted, and ``wanted`` have its shape; the numbers ``damping`` of D, and the numbers
-    that are worked on, have (nx, nz, ny).
+    Rows of A are f and its three slopes at places (m, 3) in cells, where the six coefficients of an axis begin at
+    floor(place); b are values (m,) and slopes (m, 3), W the weights of values and of slopes. Coefficients c and out
+    are flat, C-ordered of the shape, with `OVERREAD` numbers behind.
     """
-    nx, ny, nz = values.shape
-    filled = np.zeros(nx, np.bool_)
-    plane, slab = np.empty((ny, nz)), np.empty((nx, ny))
-    for i in range(nx):
-        for j in range(ny):
-            for k in range(nz):
-                plane[j, k] = values[i, j, k]
-                filled[i] |= values[i, j, k] != 0.0
-        if filled[i]:
-            _solve(second, plane)
-            _exchange(plane, work[i])
-            _solve(third, work[i])
-        else:
-            work[i] = 0.0
-    for k in range(nz):
-        # element by element: to assign one array to another takes seconds to compile
-        for i in range(nx):
-            for j in range(ny):
-                slab[i, j] = work[i, k, j]
-        _solve(first, slab)
-        for i in range(nx):
-            for j in range(ny):
-                slab[i, j] *= damping[i, k, j]
-        _solve(first, slab)
-        for i in range(nx):
-            for j in range(ny):
-                work[i, k, j] = slab[i, j]
-    for i in range(nx):
-        # nothing is wanted where no value is
-        if not filled[i]:
-            out[i] = 0.0
-            continue
-        _solve(third, work[i])
-        _exchange(work[i], plane)
-        _solve(second, plane)
-        for j in range(ny):
-            for k in range(nz):
-                out[i, j, k] = plane[j, k] if wanted[i, j, k] else 0.0
+    stride_y = shape[2]
+    stride_x = shape[1] * stride_y
+    total = 0.0
+    for i in range(places.shape[0]):
+        i0, i1, i2 = int(places[i, 0]), int(places[i, 1]), int(places[i, 2])
+        tx, ty, tz = places[i, 0] - i0, places[i, 1] - i1, places[i, 2] - i2
+        start = i0 * stride_x + i1 * stride_y + i2
+        f, fx, fy, fz = contract_first(c, start, stride_x, stride_y, tx, ty, tz)
+        r, rx, ry, rz = values[i] - f, slopes[i, 0] - fx, slopes[i, 1] - fy, slopes[i, 2] - fz
+        total += weights[0] * r * r + weights[1] * (rx * rx + ry * ry + rz * rz)
+        residual = (weights[0] * r, weights[1] * rx, weights[1] * ry, weights[1] * rz)
+        scatter(out, start, stride_x, stride_y, tx, ty, tz, residual)
+    return total
 
 
-@njit(**OPTIONS)
-def _exchange(x, out):  # type: ignore[no-untyped-def]
-    """Fill out (m, n) with x (n, m) transposed."""
+@njit(cache=True, nogil=True, **OPTIONS)
+def solve(factor, x):  # type: ignore[no-untyped-def]
+    """Solve L L^T y = x along the first axis of x (n, m), in place; bands of L (3, n) by columns, diagonal first."""
     n, m = x.shape
-    tiles = n // TILE
-    for tile in range(tiles):
-        j = tile * TILE
+    for i in range(n):
+        near = factor[1, i - 1] if i > 0 else 0.0
+        far = factor[2, i - 2] if i > 1 else 0.0
+        scale, row, before, second = 1.0 / factor[0, i], x[i], x[max(i - 1, 0)], x[max(i - 2, 0)]
         for k in range(m):
-            for b in range(TILE):
-                out[k, j + b] = x[j + b, k]
-    for j in range(tiles * TILE, n):
+            row[k] = (row[k] - near * before[k] - far * second[k]) * scale
+    for i in range(n - 1, -1, -1):
+        near = factor[1, i] if i < n - 1 else 0.0
+        far = factor[2, i] if i < n - 2 else 0.0
+        scale, row, before, second = 1.0 / factor[0, i], x[i], x[min(i + 1, n - 1)], x[min(i + 2, n - 1)]
         for k in range(m):
-            out[k, j] = x[j, k]
-
-
-@njit(**OPTIONS)
-def _solve(factors, x):  # type: ignore[no-untyped-def]
-    """S along the first axis of x (n, m), n >= 2, in place."""
-    n, m = x.shape
-    for k in range(m):
-        x[1, k] = x[1, k] - factors[0, 1] * x[0, k]
-    for i in range(2, n):
-        near, far = factors[0, i], factors[1, i]
-        row, before, second = x[i], x[i - 1], x[i - 2]
-        for k in range(m):
-            row[k] = row[k] - near * before[k] - far * second[k]
-    for k in range(m):
-        x[n - 1, k] *= factors[2, n - 1]
-        x[n - 2, k] = x[n - 2, k] * factors[2, n - 2] - factors[0, n - 1] * x[n - 1, k]
-    for step in range(2, n):
-        i = n - 1 - step
-        near, far, scale = factors[0, i + 1], factors[1, i + 2], factors[2, i]
-        row, before, second = x[i], x[i + 1], x[i + 2]
-        for k in range(m):
-            row[k] = row[k] * scale - near * before[k] - far * second[k]
+            row[k] = (row[k] - near * before[k] - far * second[k]) * scale
 
 
 LARGER, SMALLER, BESIDES = -1, -2, -3

@@ -34,17 +34,16 @@ import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.triangles.decks import what_else
-from scatterers.triangles.files import UNITS, TriangleMesh
+from scatterers.triangles.files import MOST_BYTES, UNITS, TriangleMesh
 from scatterers.triangles.jets import angle_weighted_normals
 from scatterers.triangles.quality import Choice, whole_body
 from scatterers.triangles.topology import Edges, cleaned, edges_of, flat_normals, next_corner
 
 SUFFIXES = {".step": "STEP", ".stp": "STEP", ".iges": "IGES", ".igs": "IGES", ".brep": "BREP"}
 BEGINNINGS = {"STEP": r"\s*ISO-10303-21", "IGES": r".{72}[SFG]", "BREP": r"\s*(DBRep_DrawableShape|CASCADE Topology)"}
-LARGEST = 512_000_000
-"""Bytes of a file."""
+POINTS = 10_000
+"""Points of the body that are asked for."""
 TIMEOUT = 600
-MILLIMETRE = 1e-3
 SHARP = 2.0
 """Degrees between the normals of two faces at a common point that make an edge."""
 FAR_OFF = 60.0
@@ -226,8 +225,8 @@ def kind_of(path: Path) -> str:
     if not path.is_file():
         raise ValueError(f"{path} is no file; give the path of a CAD file")
     size = path.stat().st_size
-    if size == 0 or size > LARGEST:
-        raise ValueError(f"{path.name} has {size} bytes; give a CAD file of at most {LARGEST}")
+    if size == 0 or size > MOST_BYTES:
+        raise ValueError(f"{path.name} has {size} bytes; give a CAD file of at most {MOST_BYTES}")
     with path.open("rb") as file:
         start = file.read(4096)
     if not re.match(BEGINNINGS[kind], start.decode("latin-1")):
@@ -254,7 +253,7 @@ def _scale(path: Path, kind: str, units: str | None) -> float:
         )
     if units is not None and stated != units:
         raise ValueError(f"{path.name} is in {stated}, not in {units}; leave units out")
-    return MILLIMETRE
+    return UNITS["mm"]
 
 
 def _stated(path: Path, kind: str) -> str | None:
@@ -320,12 +319,15 @@ def _faces_of(triangles: IntArray, before: IntArray, faces: IntArray) -> IntArra
         a, b, c = np.sort(corners, axis=1).T
         return np.asarray((a * size + b) * size + c)
 
-    known = code(before)
+    found, there = _looked_up(code(before), code(triangles))
+    return np.where(there, faces[found], -1)
+
+
+def _looked_up(known: IntArray, wanted: IntArray) -> tuple[IntArray, BoolArray]:
+    """Places (...) of numbers among those that are known (k,), and whether they are there."""
     order = np.argsort(known, kind="stable")
-    wanted = code(triangles)
-    place = np.searchsorted(known[order], wanted).clip(0, len(order) - 1)
-    found = order[place]
-    return np.where(known[found] == wanted, faces[found], -1)
+    found = order[np.searchsorted(known[order], wanted).clip(0, len(order) - 1)]
+    return found, known[found] == wanted
 
 
 def _corner_normals(
@@ -338,12 +340,9 @@ def _corner_normals(
     corners = mesh.vertices[mesh.triangles]
     flat = flat_normals(corners)[0]
     size = len(mesh.vertices)
-    known = face * size + at
-    order = np.argsort(known, kind="stable")
-    wanted = of[:, None] * size + mesh.triangles
-    found = order[np.searchsorted(known[order], wanted).clip(0, len(order) - 1)]
+    found, there = _looked_up(face * size + at, of[:, None] * size + mesh.triangles)
     n = normals[found] / np.maximum(np.linalg.norm(normals[found], axis=2, keepdims=True), 1e-300)
-    there = (known[found] == wanted) & np.all(np.isfinite(n), axis=2) & (np.linalg.norm(n, axis=2) > 0.5)
+    there &= np.all(np.isfinite(n), axis=2) & (np.linalg.norm(n, axis=2) > 0.5)
     # a face's orientation is that of its parameters
     for tag in np.unique(of):
         mine = of == tag

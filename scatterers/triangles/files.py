@@ -17,11 +17,10 @@ import numpy as np
 
 from creeping._typing import FloatArray, IntArray
 from scatterers.triangles.decks import read_bdf, read_medit, read_msh, understood
-from scatterers.triangles.form import check_whole, uncrossed
-from scatterers.triangles.parts import every_part
-from scatterers.triangles.quality import Choice, silent, whole_body
+from scatterers.triangles.form import Placed, assembled, check_whole, read_3mf, with_triangles
+from scatterers.triangles.parts import every_part, silent, uncrossed
+from scatterers.triangles.quality import Choice, whole_body
 from scatterers.triangles.subdivision import Subdivision
-from scatterers.triangles.threemf import Placed, assembled, read_3mf, with_triangles
 from scatterers.triangles.topology import cleaned, crossings, oriented
 
 DECKS = {".msh": read_msh, ".bdf": read_bdf, ".mesh": read_medit}

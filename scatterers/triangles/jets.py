@@ -30,14 +30,18 @@ AT_MOST = 112
 FEWEST = 36
 """Neighbours below which a jet of degree 6 is not fitted."""
 SHARE = 5000
-"""Vertices whose neighbours are sought at a time."""
+"""Vertices, triangles or points treated at a time."""
+RIDGE = 2e-4
+"""Least singular value, relative to terms of size 1, at which a combination of terms still counts."""
+WEAK = 0.02
+"""Part of a column that is new against its predecessors, below which more neighbours are asked."""
 SAME_SHEET = 0.3
 """Cosine between the normals of a vertex and its neighbours."""
 STEPS, FOOT_STEPS = 3, 8
-JET_POINTS_SHARE = 20_000
-"""Triangles treated at a time."""
 # powers of u and v in the order of `Jets.coefficients`
 POWERS = [(d - b, b) for d in range(1, 7) for b in range(d + 1)]
+DEGREES = (5, 14, 27)
+"""Terms of degree 2, 4 and 6, and less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,23 +115,75 @@ def osculating_jets(vertices: FloatArray, triangles: IntArray) -> Jets:
     >>> bool(np.all(abs(jets.gaussian - 1) < 1e-3))
     True
     """
-    from scatterers.kernels.least_squares import TERMS, fit
-
     vertices = np.ascontiguousarray(vertices, dtype=float)
     guess = angle_weighted_normals(vertices, triangles)
     near, counts = _neighbours(vertices, guess)
-    n = len(vertices)
-    frames, radii, coefficients = np.empty((n, 3, 3)), np.empty(n), np.zeros((n, TERMS))
-    residuals, lower = np.empty((n, 3)), np.zeros((n, 5))
     corners = vertices[triangles]
     edge = float(np.mean(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)))
-    radii[:], residuals[:] = edge, edge
-    fit(vertices, guess, near, counts, NEIGHBOURS, frames, radii, coefficients, residuals, lower)
+    frames, radii, coefficients, residuals, lower = _fitted(vertices, guess, near, counts)
+    fitted = counts > 0
+    radii[~fitted], residuals[~fitted] = edge, edge
     normals, principal = _curvatures(frames, radii, coefficients)
     normals4, principal4 = _curvatures(frames, radii, lower)
-    fitted = counts > 0
     tilt = np.where(fitted, np.linalg.norm(normals4 - normals, axis=1), 1.0)
     return Jets(fitted, normals, principal, principal4, residuals, tilt, frames, radii, coefficients)
+
+
+def _fitted(
+    vertices: FloatArray, normals: FloatArray, near: IntArray, counts: IntArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Frames, radii, coefficients, residuals and coefficients of degree 4, as `Jets` has them.
+
+    Fitted twice: frames of the second time have the normals of the first. Of ``counts`` neighbours the first
+    `NEIGHBOURS` are taken, and more by a quarter while these leave a term open.
+    """
+    n, terms = len(vertices), len(POWERS)
+    frames, radii, residuals = _frames(normals), np.empty(n), np.empty((n, 3))
+    coefficients, lower = np.zeros((n, terms)), np.zeros((n, terms))
+    count, times = np.minimum(counts, NEIGHBOURS), np.where(counts > 0, 0, 2)
+    # rows below the data bound combinations of terms that the points leave open: of none of slopes and curvatures
+    ridge = RIDGE * np.diag(np.arange(terms) >= DEGREES[0])
+    while len(waiting := np.flatnonzero(times < 2)):
+        k = waiting[count[waiting] == count[waiting[0]]][:SHARE]
+        away = vertices[near[k, : count[k[0]]]] - vertices[k][:, None]
+        square = np.sum(away**2, axis=2)
+        radius = np.sqrt(square.max(axis=1))[:, None]
+        weight = np.exp(-2 * square / radius**2)
+        u, v, w = np.einsum("nij,nkj->ink", frames[k], away) / radius
+        up, vp = _powers(u), _powers(v)
+        columns = np.stack([weight * up[a] * vp[b] for a, b in POWERS], axis=2)
+        height = weight * w
+        whole = np.concatenate([columns, np.broadcast_to(ridge, (len(k), terms, terms))], axis=1)
+        right = np.pad(height, ((0, 0), (0, terms)))[..., None]
+        triangle = np.asarray(np.linalg.qr(np.concatenate([whole, right], axis=2), mode="r"))
+        new = np.abs(np.einsum("njj->nj", triangle)[:, :terms]) / np.linalg.norm(whole, axis=1)
+        weak = (new.min(axis=1) < WEAK) & (count[k] < counts[k])
+        count[k[weak]] = np.minimum(count[k[weak]] * 5 // 4, counts[k[weak]])
+        times[k] = np.where(weak, 0, times[k] + 1)
+        done, triangle = k[~weak], triangle[~weak]
+        # the leading columns are those of the lower degrees
+        for d, t in enumerate(DEGREES):
+            found = np.linalg.solve(triangle[:, :t, :t], triangle[:, :t, terms:])
+            left = height[~weak] - (columns[~weak, :, :t] @ found)[..., 0]
+            residuals[done, d] = np.linalg.norm(left, axis=1) / np.linalg.norm(weight[~weak], axis=1)
+            (coefficients if t == terms else lower)[done, :t] = found[..., 0]
+        radii[done] = radius[~weak, 0]
+        residuals[done] *= radii[done, None]
+        first = done[times[done] == 1]
+        frames[first] = _frames(_curvatures(frames[first], radii[first], coefficients[first])[0])
+    return frames, radii, coefficients, residuals, lower
+
+
+def _frames(normals: FloatArray) -> FloatArray:
+    """Right-handed orthonormal rows (n, 3, 3), the last one the normal (n, 3).
+
+    [Duff et al., Building an orthonormal basis, revisited, JCGT 6 (2017)]: no division by zero anywhere.
+    """
+    x, y, z = normals.T
+    sign = np.copysign(1.0, z)
+    a = -1.0 / (sign + z)
+    rows = [(1 + sign * x * x * a, sign * x * y * a, -sign * x), (x * y * a, sign + y * y * a, -y), (x, y, z)]
+    return np.stack([np.stack(row, axis=1) for row in rows], axis=1)
 
 
 def angle_weighted_normals(vertices: FloatArray, triangles: IntArray) -> FloatArray:
@@ -202,15 +258,15 @@ def centroids(vertices: FloatArray, triangles: IntArray, jets: Jets) -> tuple[Fl
     """Points (m, 3) and outward unit normals (m, 3) at the middles of the triangles whose corners all have jets."""
     triangles = triangles[np.all(jets.fitted[triangles], axis=1)]
     points, normals = np.empty((len(triangles), 3)), np.empty((len(triangles), 3))
-    for start in range(0, len(triangles), JET_POINTS_SHARE):
-        some = triangles[start : start + JET_POINTS_SHARE]
+    for start in range(0, len(triangles), SHARE):
+        some = triangles[start : start + SHARE]
         at = vertices[some].mean(axis=1)
         for _ in range(STEPS):
             value, gradient = _distance(vertices, jets, some, at)
             at = at - (value / np.sum(gradient**2, axis=1))[:, None] * gradient
         gradient = _distance(vertices, jets, some, at)[1]
-        points[start : start + JET_POINTS_SHARE] = at
-        normals[start : start + JET_POINTS_SHARE] = gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
+        points[start : start + SHARE] = at
+        normals[start : start + SHARE] = gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
     return points, normals
 
 
@@ -223,8 +279,8 @@ def signed_distance(vertices: FloatArray, jets: Jets, at: FloatArray) -> FloatAr
 
     nearest = cKDTree(vertices).query(at)[1]
     out = np.empty(len(at))
-    for start in range(0, len(at), JET_POINTS_SHARE):
-        some = slice(start, start + JET_POINTS_SHARE)
+    for start in range(0, len(at), SHARE):
+        some = slice(start, start + SHARE)
         out[some] = _foot(vertices, jets, nearest[some], at[some])
     return out
 

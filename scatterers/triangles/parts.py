@@ -12,6 +12,13 @@ two belong to one sheet, unless triangles hang together by other edges. Of an od
 together, and what is left over, as of a fin, has an open edge there.
 
 Corners of triangles that are joined across edges make umbrellas; each has a vertex of its own.
+
+Also here: small crossings of a mesh cut out: triangles that cross others go with their neighbours, and the holes are
+closed.
+
+Lids go from the border of a hole to its middle, and may cross something themselves: then
+they are cut out again with what is around them, so that the hole grows, for a few rounds. What was cut stays a small
+share of the area; else the mesh is left as it is.
 """
 
 import importlib.util
@@ -20,12 +27,24 @@ from collections.abc import Callable
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
-from scatterers.triangles.topology import Edges, components, edges_of, flat_normals, oriented, umbrellas
+from scatterers.triangles.topology import (
+    KEPT,
+    Edges,
+    components,
+    crossings,
+    edges_of,
+    flat_normals,
+    oriented,
+    umbrellas,
+)
 
 LISTED = 8
 """Parts that an error lists."""
 MOST_SHARED = 100_000
 """Edges of more than two triangles beyond which a mesh is soup, and left as it is."""
+ROUNDS = 6
+MOST_CUT = 0.1
+"""Share of the area that may be cut out."""
 
 
 Note = Callable[[str], None]
@@ -314,3 +333,60 @@ def _pairs(angle: FloatArray, forward: BoolArray, sheet: IntArray) -> IntArray:
     flat = [(abs(abs(angle[i] - angle[j]) - np.pi), i, j) for i in left for j in left if forward[i] > forward[j]]
     take([(i, j) for _, i, j in sorted(flat)])
     return np.array(found, dtype=np.int64).reshape(-1, 2)
+
+
+def uncrossed(
+    name: str, vertices: FloatArray, triangles: IntArray, largest: float, scale: float, note: Note
+) -> tuple[FloatArray, IntArray]:
+    """Vertices (n, 3) and triangles (m, 3) of the mesh without its crossings, as given where that cannot be done.
+
+    ``largest`` is the size of the largest hole that is closed, m; lengths times ``scale`` are metres.
+    """
+    x, t, cut, share = vertices, triangles, 0, 0.0
+    whole = float(areas(x, t).sum())
+    for _ in range(ROUNDS):
+        count, pairs = crossings(x, t)
+        if not count:
+            if cut:
+                note(
+                    f"{cut} triangles of {name} that crossed others, or next to them, {100 * share:.2g} % of its area, "
+                    "cut out and their holes closed"
+                )
+            return x, t
+        if count >= KEPT:
+            break
+        near = np.zeros(len(x), dtype=bool)
+        near[t[pairs.ravel()]] = True
+        gone = near[t].any(axis=1)
+        cut += int(gone.sum())
+        share += float(areas(x, t[gone]).sum()) / whole
+        if share > MOST_CUT or gone.all():
+            break
+        closed = _closed(name, *compact(x, t[~gone]), largest, scale)
+        if closed is None:
+            break
+        x, t = closed
+    return vertices, triangles
+
+
+def _closed(
+    name: str, vertices: FloatArray, triangles: IntArray, largest: float, scale: float
+) -> tuple[FloatArray, IntArray] | None:
+    """The largest part with its holes closed, None if it is not closed then."""
+    x, t = taken_apart(name, vertices, triangles, silent)
+    part = parts_of(x, t)
+    size = areas(x, t)
+    if float(size[part > 0].sum()) > MOST_CUT * float(size.sum()):
+        return None
+    x, t = compact(x, t[part == 0])
+    x, t = capped(name, x, t, largest, scale, silent)
+    if np.any(edges_of(t).faces != 2):
+        return None
+    try:
+        return x, oriented(name, x, t, silent)
+    except ValueError:
+        return None
+
+
+def silent(_: str) -> None:
+    """Note of what needs no telling."""

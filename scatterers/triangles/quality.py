@@ -5,7 +5,7 @@ of the jet of degree d, a vertex is *bad* if max(|n_4 - n_6|, e |kappa_4 - kappa
 0.5 off the normals of its triangles, as at a tip, whose jet follows one side of it; and
 
     smooth           none of the following;
-    sharp            edges of more than 40 degrees, and thrice the median, that follow each other;
+    sharp            edges of more than 40 degrees that follow each other;
     noisy            res_6/res_2 > 0.15 in the median: neither degree describes the vertices;
     curvature jumps  res_6/res_4 stays near 1/2 along curves. On a smooth surface it falls like (kappa e)^2; where kappa
                      jumps by D, both residuals are D e^2 times a number. Or kappa_4 and kappa_6 differ there by more
@@ -30,27 +30,25 @@ import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.triangles.jets import Jets, angle_weighted_normals
-from scatterers.triangles.parts import capped, chosen_part, taken_apart, united
+from scatterers.triangles.parts import capped, chosen_part, silent, taken_apart, united
+from scatterers.triangles.regions import FEWEST, SHARP
 from scatterers.triangles.topology import cleaned, edges_of, flat_normals, oriented
 
 BAD = 0.03
 ASTRAY = 0.5
 """|n_6 - n| of a jet that does not follow its triangles; on slivers of smooth bodies it is below 0.2."""
-FEW = 100
-"""Vertices below which no jet of degree 6 means anything."""
 RESOLVED = 0.3
 """kappa e that a uniform grid resolves."""
-SHARP = 40.0
 SLIVER = 0.05
 """Area, relative to the median, below which the normal of a triangle is not asked."""
-NOISE_RATIO, NOISE = 0.15, 5e-4
+NOISE_RATIO = 0.15
 RESIDUAL_PER_NOISE = 0.95, 0.81
 """Residuals of degree 4 and 6 on noise: sqrt(1 - terms/neighbours), a little more by the weights."""
-JUMP_DECAY, JUMP_RESIDUAL = 0.33, 1e-4
+JUMP_DECAY = 0.33
 ROUNDING = 1e-12
 """Edges below which a residual is rounding of the vertices."""
-FEWEST_RIMS, JUMPS_ALONG = 6, 0.5
-"""Vertices that make a rim; jumps, in roots of the number of vertices, that make a curve over the body."""
+JUMPS_ALONG = 0.5
+"""Jumps, in roots of the number of vertices, that make a curve over the body."""
 
 
 Verdict = Literal["smooth", "noisy", "sharp", "curvature jumps", "too coarse"]
@@ -209,7 +207,7 @@ def jumps_at(jets: Jets, edge: float) -> BoolArray:
     curvature, doubt = np.abs(jets.principal).max(axis=1), _doubt(jets)
     _, fourth, sixth = np.maximum(jets.residuals, ROUNDING * edge).T
     resolved = float(np.percentile(curvature, 99)) * edge
-    jump = (sixth > JUMP_DECAY * fourth) & (sixth > max(JUMP_RESIDUAL * edge, 5 * float(np.median(sixth))))
+    jump = (sixth > JUMP_DECAY * fourth) & (sixth > 5 * float(np.median(sixth)))
     strong = float(np.percentile(curvature, 90))
     # noise of s e changes kappa_4 - kappa_6 by up to 8 s/e where the jet is well determined
     jump |= doubt > (0.25 + 100 * resolved**4) * strong + 12 * float(np.median(sixth)) / edge**2
@@ -226,20 +224,20 @@ def _verdict(quality: dict[str, Any], jets: Jets, *, rims: int, unseen: int) -> 
     curvature, noise = quality["curvature"], quality["noise"]
     bad = int(np.sum(badness > BAD))
     worst = f"worst {badness.max():.2g} at vertex {int(badness.argmax())}"
-    if rims >= FEWEST_RIMS:
+    if rims >= FEWEST:
         return "sharp", (
             f"{rims} of {count} vertices lie on edges of more than {SHARP:.0f} degrees (largest "
             f"{quality['dihedral'][2]:.0f}); round the edges off over several triangles, or give another body"
         )
-    if count < FEW or np.mean(~jets.fitted) > 0.5:
+    if np.mean(~jets.fitted) > 0.5:
         return "too coarse", f"{count} vertices are too few for a smooth surface; give some thousands"
-    if quality["residual_ratio"][0] > NOISE_RATIO and noise > NOISE and curvature < 1:
+    if quality["residual_ratio"][0] > NOISE_RATIO and curvature < 1:
         return "noisy", (
             f"the vertices scatter by about {noise:.2g} of an edge, {noise * quality['edge_mean']:.2g} m, "
             f"which makes curvatures uncertain by some {100 * min(1.0, noise / max(curvature, 1e-3)):.2g} %; smooth "
             "the mesh, or export it with more digits"
         )
-    if JUMPS_ALONG * np.sqrt(count) <= jumps < 0.2 * count and curvature < RESOLVED:
+    if JUMPS_ALONG * np.sqrt(count) <= jumps and curvature < RESOLVED:
         return "curvature jumps", (
             f"the curvature jumps at {jumps} of {count} vertices, as where a cylinder meets a sphere; rays across them "
             "are of low order: blend the faces with continuous curvature"
@@ -271,9 +269,7 @@ def noise_at_most(jets: Jets) -> float:
 
 def _rims(ends: IntArray, angles: FloatArray, count: int) -> int:
     """Vertices at which at least two sharp edges meet, or 0 if most sharp edges stand alone, as those of slivers do."""
-    sharp = (angles > SHARP) & (angles > 3 * np.median(angles))
-    # where most edges are sharp, as on a cube, the median says nothing
-    sharp |= angles > 60
+    sharp = angles > SHARP
     meeting = np.bincount(ends[sharp].ravel(), minlength=count)
     chained = int(np.sum(meeting >= 2))
     return chained if 2 * chained > np.sum(meeting > 0) else 0
@@ -352,7 +348,3 @@ def whole_body(
         vertices, triangles = cleaned(name, vertices, triangles, silent, silent)
         vertices, triangles = taken_apart(name, vertices, triangles, silent)
     return vertices, triangles
-
-
-def silent(_: str) -> None:
-    """Note of what needs no telling."""

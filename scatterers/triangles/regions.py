@@ -23,8 +23,6 @@ ALIKE = 0.4
 """Turn against another neighbour, relative to that of the edge, from which on a facet is one of a round surface."""
 FEWEST = 6
 """Edges of a chain, unless all are turned by more than `ALWAYS`, as those of a tetrahedron."""
-SLIVER = 1e-3
-"""Area, relative to the median, below which the normal of a triangle is not asked."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +108,7 @@ def _turns(vertices: FloatArray, triangles: IntArray) -> tuple[IntArray, IntArra
     edges = edges_of(triangles)
     # both corners of each edge, that of the triangle that runs forward along it first
     order = np.lexsort((~edges.forward, edges.number)).reshape(-1, 2)
-    normal, area = flat_normals(vertices[triangles])
+    normal = flat_normals(vertices[triangles])[0]
     sides = order // 3
     left, right = normal[sides[:, 0]], normal[sides[:, 1]]
     across = np.cross(left, right)
@@ -118,10 +116,7 @@ def _turns(vertices: FloatArray, triangles: IntArray) -> tuple[IntArray, IntArra
     turn = np.degrees(np.arctan2(np.linalg.norm(across, axis=1), np.sum(left * right, axis=1)))
     # the left triangle runs forward along the edge: at a convex edge left x right points along it
     turn = np.where(np.sum(across * along, axis=1) >= 0, turn, -turn)
-    thin = np.minimum(area[sides[:, 0]], area[sides[:, 1]]) < SLIVER * np.median(area) * (
-        np.linalg.norm(along, axis=1) / np.sqrt(2 * np.median(area))
-    ).clip(None, 1.0)
-    return edges.ends, sides, np.where(thin & (np.abs(turn) < ALWAYS), 0.0, turn)
+    return edges.ends, sides, turn
 
 
 def _piecewise(sides: IntArray, turn: FloatArray, count: int) -> BoolArray:

@@ -6,8 +6,8 @@ import shared_bodies as sc
 
 from creeping.geometry.curvature import normal_curvature
 from creeping.geometry.evaluators import evaluators
-from creeping.geometry.kernels.nearest import normal_sections
 from creeping.geometry.surface import normal, project
+from creeping.kernels.nearest import normal_sections
 
 
 @pytest.mark.parametrize("body", [sc.Ellipsoid(1.3, 0.7, 0.9), sc.Torus(), sc.TwistedEllipsoid()], ids=repr)

@@ -17,8 +17,8 @@ import creeping as cr
 import scatterers as sc
 from creeping.geometry.evaluators import polar_frame
 from creeping.geometry.surface import Surface
+from scatterers.kernels.charts import cos_pi, sin_pi
 from scatterers.kernels.compiled import SYMMETRIC
-from scatterers.kernels.sphere_maps import cos_pi, sin_pi
 
 
 def test_every_body_passes_its_check(body):

@@ -11,7 +11,7 @@ import creeping as cr
 import scatterers as sc
 from creeping.geodesics.bundle import project_bundle, random_bundle_points
 from creeping.geometry.surface import normal
-from scatterers.charts.radial import Spine
+from scatterers.charts.star import Spine
 from scatterers.fits.tensor import TensorSpline, coefficients, interpolation_operator
 from scatterers.kernels.compiled import SYMMETRIC
 from scatterers.kernels.tensor import POWERS

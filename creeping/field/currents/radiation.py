@@ -35,8 +35,7 @@ from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.field.currents.nodes import LitNodes
 from creeping.geodesics.equations import points_of_charts
 from creeping.geometry.curvature import curvature_norms, gaussian_curvature
-from creeping.geometry.memo import memo
-from creeping.geometry.surface import Surface
+from creeping.geometry.surface import Surface, memo
 from creeping.kernels.threads import in_threads
 
 TOLERANCE = 1e-9

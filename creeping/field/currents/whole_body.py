@@ -53,9 +53,8 @@ from creeping.field.currents.radiation import far_of_scalar, field_of_scalar, ph
 from creeping.field.results.far_result import FarField
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.checks import unit_of
-from creeping.geometry.parts import inside
 from creeping.geometry.quadrature import body_nodes, inner_points
-from creeping.geometry.surface import Surface
+from creeping.geometry.surface import Surface, inside
 from creeping.storage.parts import Keeping, not_kept
 
 DEPTH = 0.25

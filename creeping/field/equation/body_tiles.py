@@ -21,11 +21,10 @@ from creeping.errors import SurfaceError
 from creeping.field.boundary import Boundary
 from creeping.field.equation.tiles import CUT, POINTS, SIDE, VARYING, WIDE, WIDE_CUT, Tiles, tiles_for, tiles_of
 from creeping.geometry.covering import patches_of
-from creeping.geometry.memo import memo
-from creeping.geometry.parts import inside, is_faceted, why_no_rays
 from creeping.geometry.patches import SHARP, Patches, chordal, facet_patches, halved, own_triangles, sides_of, turns_of
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.plane_faces import with_whole_faces
+from creeping.geometry.surface import inside, is_faceted, memo, why_no_rays
 
 CHEAP = 4000
 """Nodes up to which those of five a side serve: of a body that is small against the wavelength it is its own shape that

@@ -22,8 +22,7 @@ from creeping.field.equation.matrix import EACH, VECTOR
 from creeping.field.equation.mirrors import mirrors_of
 from creeping.field.equation.split_sums import CURL, ONE_LAYER, TWO_LAYERS, SmoothKernel, best_split
 from creeping.field.equation.tiles import Tiles
-from creeping.geometry.memo import memo
-from creeping.geometry.surface import Surface, size
+from creeping.geometry.surface import Surface, memo, size
 from creeping.kernels.threads import thread_count
 from creeping.storage.memory import budget
 

@@ -22,7 +22,7 @@ from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
 from creeping.field.equation.matrix import BLOCK, Matrix, Places
 from creeping.field.equation.tiles import Tiles
-from creeping.geometry.memo import memo
+from creeping.geometry.surface import memo
 
 FLIPS: tuple[tuple[int, ...], ...] = (0,), (1,), (2,), (0, 1), (0, 2), (1, 2), (0, 1, 2)
 FEW = 32

@@ -37,8 +37,8 @@ from creeping.field.results.point_result import (
 from creeping.field.waves.reflected import plane_reflection
 from creeping.geodesics.bundle import as_points
 from creeping.geometry.checks import unit_of
-from creeping.geometry.parts import inside as inside_of
 from creeping.geometry.surface import Surface, size
+from creeping.geometry.surface import inside as inside_of
 from creeping.shadow.attachment import is_lit
 from creeping.storage.parts import Keeping, not_kept
 

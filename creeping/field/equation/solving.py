@@ -31,9 +31,8 @@ from creeping.field.equation.effort import ASKED, SECONDS, Effort, equation_boun
 from creeping.field.equation.solution import Solution
 from creeping.geodesics.equations import points_of_charts
 from creeping.geometry.directions import unit_directions
-from creeping.geometry.memo import memo
 from creeping.geometry.piecewise import is_piecewise
-from creeping.geometry.surface import Surface
+from creeping.geometry.surface import Surface, memo
 from creeping.storage.parts import Keeping, not_kept
 
 KEPT = 6

@@ -35,9 +35,8 @@ from creeping.field.waves.far_geometry import fan_strips
 from creeping.field.waves.gaussian_beams import MOST_TURNED
 from creeping.field.waves.ray_sums import RaySum
 from creeping.field.waves.strip_waves import StripTable, around, modes_on_strip
-from creeping.geometry.memo import memo_of
 from creeping.geometry.piecewise import has_edges, is_piecewise
-from creeping.geometry.surface import Surface
+from creeping.geometry.surface import Surface, memo_of
 from creeping.rays.fan import RayFan
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays

@@ -38,8 +38,7 @@ from creeping.field.tmatrix.solved_waves import SolvedWaves
 from creeping.field.tmatrix.spherical_waves import count, vector_count
 from creeping.geometry.arguments import folder_path, real_array, shown, whole_number
 from creeping.geometry.checks import unit_of
-from creeping.geometry.memo import memo
-from creeping.geometry.surface import Surface, fingerprint
+from creeping.geometry.surface import Surface, fingerprint, memo
 from creeping.kernels.threads import thread_count
 from creeping.storage.memory import budget, within_budget
 from creeping.storage.parts import Arrays, Keeping, Parts, not_kept

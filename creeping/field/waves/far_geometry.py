@@ -32,9 +32,8 @@ from creeping.geodesics.states import END, WITH_END, WITH_JACOBI
 from creeping.geometry.curvature import ParabolicPoints, parabolic_points
 from creeping.geometry.directions import first_of_equals
 from creeping.geometry.evaluators import evaluators
-from creeping.geometry.memo import memo, memo_of
 from creeping.geometry.piecewise import is_piecewise
-from creeping.geometry.surface import Surface, normal, size
+from creeping.geometry.surface import Surface, memo, memo_of, normal, size
 from creeping.geometry.triangulation import Triangulation
 from creeping.rays.aimed import rays_towards, same_within
 from creeping.rays.fan import RayFan

@@ -53,9 +53,8 @@ from creeping.field.waves.far_rays import Parts
 from creeping.field.waves.likely_cells import parted
 from creeping.field.waves.reflected import plane_reflection
 from creeping.geometry.curvature import curvature_norms
-from creeping.geometry.memo import memo
 from creeping.geometry.piecewise import Tiles, is_convex, pieces_of, tiles_of
-from creeping.geometry.surface import size
+from creeping.geometry.surface import memo, size
 from creeping.kernels.threads import in_threads
 from creeping.rays.fan import RayFan
 from creeping.rays.specular import SpecularPoints, smooth_parts, specular_on_pieces, stand_clear

@@ -35,7 +35,7 @@ from creeping.field.boundary import Boundary
 from creeping.field.creeping_modes import BETA, decay_slopes, decay_terms, modes_of
 from creeping.field.special.airy import MODES, Modes
 from creeping.field.special.fock import SERIES, pekeris_slope, pekeris_star, pole
-from creeping.geometry.memo import memo
+from creeping.geometry.surface import memo
 from creeping.kernels.threads import in_slices
 from creeping.rays.quantities import RayPoints
 

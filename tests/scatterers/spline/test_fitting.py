@@ -9,11 +9,10 @@ from body_checks import directions, rms, unit
 import scatterers as sc
 from creeping.geometry.directions import fibonacci_directions
 from scatterers.fits import solver as _fitting
-from scatterers.fits.solver import _Equations, fit, fourth_bands, ranges
-from scatterers.fits.tensor import Cardinal, TensorSpline, coefficients
+from scatterers.fits.solver import _Equations, fit
+from scatterers.fits.tensor import TensorSpline, cardinal, coefficients
 from scatterers.kernels.compiled import evaluated
-from scatterers.kernels.least_squares import accumulate, subtract_roughness
-from scatterers.kernels.tensor import OVERREAD
+from scatterers.kernels.tensor import OVERREAD, accumulate
 
 SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 TRIAXIAL = sc.Ellipsoid(1.0, 0.8, 0.6)
@@ -62,56 +61,27 @@ def system(rng):
 
 
 def test_roughness_is_that_of_fourth_differences(rng):
-    shape = (9, 5, 4)
-    c = np.concatenate([rng.normal(size=np.prod(shape)), np.zeros(OVERREAD)])
-    out = np.zeros_like(c)
-    whole = np.tile([0, shape[2]], (shape[0] * shape[1], 1))
-    subtract_roughness(0.3, np.array(shape), whole, fourth_bands(shape), c, out)
-    expected = np.zeros(shape)
-    for axis in (0, 1):
-        fourth = np.diff(np.eye(shape[axis]), 4, axis=0)
-        along = np.tensordot(fourth.T @ fourth, c[:-OVERREAD].reshape(shape), axes=(1, axis))
+    equations = _Equations(*cloud(TRIAXIAL, 200), 0.35, 0.3, 1.0)
+    c = np.concatenate([rng.normal(size=np.prod(equations.shape)), np.zeros(OVERREAD)])
+    rough, plain = (equations.residual(c, targets=True, rough=one)[:-OVERREAD] for one in (True, False))
+    expected = np.zeros(equations.shape)
+    for axis, n in enumerate(equations.shape):
+        fourth = np.diff(np.eye(n), 4, axis=0)
+        along = np.tensordot(fourth.T @ fourth, c[:-OVERREAD].reshape(equations.shape), axes=(1, axis))
         expected -= 0.3 * np.moveaxis(along, 0, axis)
-    np.testing.assert_allclose(out[:-OVERREAD].reshape(shape), expected, atol=1e-13)
-    assert not out[-OVERREAD:].any()
-    # only where it is wanted
-    some, found = whole.copy(), np.zeros_like(c)
-    some[:, 0], some[:, 1] = 1, 3
-    some[7] = 0
-    subtract_roughness(0.3, np.array(shape), some, fourth_bands(shape), c, found)
-    wanted = np.zeros(shape, dtype=bool)
-    wanted[:, :, 1:3] = True
-    wanted[1, 2] = False
-    np.testing.assert_allclose(found[:-OVERREAD].reshape(shape), np.where(wanted, expected, 0), atol=1e-13)
+    expected *= equations.unknown
+    np.testing.assert_allclose((rough - plain).reshape(equations.shape), expected, atol=1e-11)
 
 
 @pytest.mark.parametrize("shape", [(7, 20, 9), (5, 6, 130)])
-def test_cardinal_coefficients_take_the_values_twice(rng, shape):
-    damping, wanted = rng.random(shape) + 0.5, rng.random(shape) < 0.7
-    wanted[2] = False
-    values, everywhere = np.where(wanted, rng.normal(size=shape), 0.0), np.ones(shape, dtype=bool)
-
-    def sampled(c):
-        for axis, n in enumerate(shape):
-            bands = [1, 26, 66, 26, 1]
-            matrix = sum(np.diag(np.full(n - abs(k), bands[k + 2] / 120), k) for k in range(-2, 3))
-            c = np.moveaxis(np.tensordot(matrix, c, axes=(1, axis)), 0, axis)
-        return c
-
-    # B (D^-1 (B c)) = values
-    filled = values + rng.normal(size=shape)
-    c = Cardinal(damping)(filled, everywhere, np.full(shape, np.nan))
-    np.testing.assert_allclose(sampled(sampled(c) / damping), filled, atol=1e-11)
-    every = Cardinal(damping)(values + 1e-300, everywhere, np.full(shape, np.nan))
-    some = Cardinal(damping)(values, wanted, np.full(shape, np.nan))
-    np.testing.assert_allclose(some, np.where(wanted, every, 0.0), atol=1e-12)
-
-
-def test_ranges_hold_all_that_is_unknown(rng):
-    unknown = rng.random((4, 5, 6)) < 0.2
-    found = ranges(unknown)
-    for row, (first, last) in zip(unknown.reshape(-1, 6), found, strict=True):
-        assert row[first:last].sum() == row.sum() and (last == 0 or (row[first] and row[last - 1]))
+def test_cardinal_coefficients_take_the_values(rng, shape):
+    values = rng.normal(size=shape)
+    found = cardinal(values)
+    for axis, n in enumerate(shape):
+        bands = [1, 26, 66, 26, 1]
+        matrix = sum(np.diag(np.full(n - abs(k), bands[k + 2] / 120), k) for k in range(-2, 3))
+        found = np.moveaxis(np.tensordot(matrix, found, axes=(1, axis)), 0, axis)
+    np.testing.assert_allclose(found, values, atol=1e-12)
 
 
 def test_rows_are_value_and_slopes_of_the_spline_and_scatter_is_their_adjoint(system, rng):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scatterers.triangles.files import read_mesh
-from scatterers.triangles.threemf import with_triangles
+from scatterers.triangles.form import with_triangles
 
 
 @pytest.mark.parametrize("header", ["OFF\n{} {} 0", "OFF {} {} 0", "# by hand\nOFF\n{} {} 0\n# corners"])

@@ -1,12 +1,11 @@
-"""Compiled parts of sphere maps and locators, and the map of `scatterers.charts.radial`; importing this imports numba.
+"""Compiled parts of charts: sphere maps and locators, and the map of `scatterers.charts.star`.
 
-cos(pi z), sin(pi z) and the angle of a vector by polynomials: compilers vectorise them, and only call a library's.
+Importing this module imports numba.
+
+cos(pi z) and sin(pi z) by polynomials: compilers vectorise them, and only call a library's.
 
 z = k + r with k the nearest integer, |r| <= 1/2 exactly; cos(pi z) = (-1)^k sum_j (-1)^j (pi r)^(2j)/(2j)!, the sine
 likewise. The Taylor sums end where (pi/2)^m/m! < 2e-17, so rounding, some 2e-16, is all that is left.
-
-The angle is 1/2 pi times arctan z = z - z^3/3 + ..., |z| <= tan(pi/8), by a polynomial with an error below rounding:
-arctan(a/b) = pi/4 + arctan((a - b)/(a + b)) for larger ones.
 
 The series are those of [AS64, sec. 4.3].
 
@@ -21,9 +20,22 @@ and s_v likewise. The frame of tangents T is T (T^T T)^(-1/2), by the closed roo
 
 Also here: the radial map, whose parameters are those of the spline, `scatterers.kernels.tensor` says where.
 
-Sources: Derivations, B1, B2 and B4.
+Also here: compiled parts of `scatterers.charts.monge`: the locator, and the growth of charts.
+
+A chart grows over a graph of points of the body from its centre, in the order of rho = max(|q.E1|, |q.E2|),
+q = x - x0, so that it never leaps to another sheet over the same square. It ends before the first point with
+n.N < ``least``, or rho > ``longest``, or rho max|kappa| > ``most`` with the largest curvature of the points passed.
+
+Also here: where values stand in the flat parameters of an atlas of Monge charts, which its compiled locator shares.
+
+Origin of the voxels, 1/side, their numbers along the axes, where the table of voxels begins, the least n.N and the
+largest |2u - 1|; then `CHART` values a chart: x0, E1, E2, N, 1/w, bounds of the height. The table gives for each voxel
+the place of its list of charts, which begins with its length.
+
+Sources: Derivations, B1 to B4.
 """
 
+import heapq
 import math
 from collections.abc import Callable
 from types import FunctionType
@@ -47,24 +59,11 @@ from scatterers.kernels.tensor import (
     SHIFTS,
     SMALL,
     value_and_gradient,
+    voxel_place,
 )
 
 _COS: tuple[float, ...] = tuple((-1) ** j * math.pi ** (2 * j) / math.factorial(2 * j) for j in range(12))
 _SIN: tuple[float, ...] = tuple((-1) ** j * math.pi ** (2 * j + 1) / math.factorial(2 * j + 1) for j in range(11))
-
-_TAN_PI_8 = math.tan(math.pi / 8)
-_ATAN: tuple[float, ...] = (
-    -0.33333333333328435,
-    0.19999999998854168,
-    -0.14285714180900647,
-    0.11111106177375227,
-    -0.09090773003240828,
-    0.07689952488233016,
-    -0.066402251735395,
-    0.0568830340363325,
-    -0.04347919839046537,
-    0.021133752033748364,
-)
 
 
 @helper
@@ -89,26 +88,6 @@ def sin_pi(z: float) -> float:
     for j in range(9, -1, -1):
         total = total * r2 + _SIN[j]
     return total * r * (1.0 - 2.0 * (nearest - 2.0 * math.floor(0.5 * nearest)))
-
-
-@helper
-def turns(across: float, along: float) -> float:
-    """atan2(across, along) in turns, in [-1/2, 1/2]; 0 of a vector that vanishes."""
-    a, b = abs(across), abs(along)
-    low, high = min(a, b), max(a, b)
-    steep = low > _TAN_PI_8 * high
-    top = low - high if steep else low
-    bottom = low + high if steep else high
-    z = top / (bottom if bottom > 0.0 else 1.0)
-    s = z * z
-    total = _ATAN[9]
-    for j in range(8, -1, -1):
-        total = total * s + _ATAN[j]
-    angle = (z + z * s * total) * (0.5 / math.pi)
-    angle = angle + 0.125 if steep else angle
-    angle = 0.25 - angle if a > b else angle
-    angle = 0.5 - angle if along < 0.0 else angle
-    return -angle if across < 0.0 else angle
 
 
 @helper
@@ -287,29 +266,14 @@ def one_cell(box: FloatArray, of_map: FloatArray) -> FloatArray:
 
 
 def inverse(points, s, parameters):  # type: ignore[no-untyped-def]
-    """psi^-1 of a block.
-
-    The shift is not taken from `_spine` so that the loops are vectorised; each touches few rows for the same reason.
-    """
-    a, b, c = 1 / parameters[HALF_AXES], 1 / parameters[HALF_AXES + 1], 1 / parameters[HALF_AXES + 2]
-    spine, middle, per_half = int(parameters[AXIS]), parameters[MIDDLE], parameters[PER_HALF]
-    n = points.shape[1]
-    for axis in range(3):
-        centre, start = parameters[CENTRE + axis], SHIFTS + axis * (DEGREE + 1)
-        if per_half == 0.0 or axis == spine:
-            for i in range(n):
-                s[axis, i] = points[axis, i] - centre
-            continue
-        c0, c1, c2, c3 = parameters[start], parameters[start + 1], parameters[start + 2], parameters[start + 3]
-        c4, c5, c6 = parameters[start + 4], parameters[start + 5], parameters[start + 6]
-        for i in range(n):
-            t = (points[spine, i] - middle) * per_half
-            t = -REACH if t < -REACH else t
-            t = REACH if t > REACH else t
-            shift = c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * (c5 + t * c6)))))
-            s[axis, i] = points[axis, i] - shift - centre
-    for i in range(n):
-        x, y, z = a * s[0, i], b * s[1, i], c * s[2, i]
+    """psi^-1 of a block."""
+    a, b, c = parameters[HALF_AXES], parameters[HALF_AXES + 1], parameters[HALF_AXES + 2]
+    for i in range(points.shape[1]):
+        x, y, z = points[0, i], points[1, i], points[2, i]
+        shift, _ = _spine((x, y, z), parameters)
+        x = (x - shift[0] - parameters[CENTRE]) / a
+        y = (y - shift[1] - parameters[CENTRE + 1]) / b
+        z = (z - shift[2] - parameters[CENTRE + 2]) / c
         scale = 1.0 / math.sqrt(x * x + y * y + z * z)
         s[0, i], s[1, i], s[2, i] = scale * x, scale * y, scale * z
 
@@ -334,3 +298,123 @@ def locate(points, gradients, chart, uv, frame, parameters):  # type: ignore[no-
         tx, ty, tz = _pushed((tx - t * x, ty - t * y, tz - t * z), slope, parameters)
         wx, wy, wz = _pushed((wx - w * x, wy - w * y, wz - w * z), slope, parameters)
         fill_frame(frame, i, tx, ty, tz, wx, wy, wz)
+
+
+ORIGIN, PER_SIDE, SHAPE, VOXELS, LEAN, OUTSIDE = 0, 3, 4, 7, 8, 9
+FIRST = 10
+CHART = 15
+# added to the score of a chart that is not valid
+BEHIND = 1e3
+
+
+@njit(**OPTIONS)
+def _bounded(t, beyond):  # type: ignore[no-untyped-def]
+    """Chart variable (1 + t)/2, held within the chart; a NaN gives 1/2."""
+    t = t if t > -beyond else (-beyond if t <= -beyond else 0.0)
+    return 0.5 + 0.5 * (t if t < beyond else beyond)
+
+
+def locate_graph(points, gradients, chart, uv, frame, parameters):  # type: ignore[no-untyped-def]
+    """Chart, chart variables and polar frame of a block.
+
+    Where no chart is valid, the one with the least max(|u - 1/2|, |v - 1/2|), else chart 0, with bounded u and v.
+    """
+    least, beyond, voxels = parameters[LEAN], parameters[OUTSIDE], int(parameters[VOXELS])
+    for i in range(points.shape[1]):
+        x, y, z = points[0, i], points[1, i], points[2, i]
+        nx, ny, nz = gradients[0, i], gradients[1, i], gradients[2, i]
+        scale = 1.0 / math.sqrt(nx * nx + ny * ny + nz * nz)
+        nx, ny, nz = nx * scale, ny * scale, nz * scale
+        cell = voxel_place(x, parameters[ORIGIN], parameters[PER_SIDE], parameters[SHAPE])
+        cell = cell * int(parameters[SHAPE + 1])
+        cell += voxel_place(y, parameters[ORIGIN + 1], parameters[PER_SIDE], parameters[SHAPE + 1])
+        cell = cell * int(parameters[SHAPE + 2])
+        cell += voxel_place(z, parameters[ORIGIN + 2], parameters[PER_SIDE], parameters[SHAPE + 2])
+        entry = int(parameters[voxels + cell])
+        count = int(parameters[entry])
+        number = int(parameters[entry + 1]) if count > 0 else 0
+        best, s, t = math.inf, math.nan, math.nan
+        for k in range(entry + 1, entry + 1 + count):
+            row = FIRST + CHART * int(parameters[k])
+            qx, qy, qz = x - parameters[row], y - parameters[row + 1], z - parameters[row + 2]
+            a = qx * parameters[row + 3] + qy * parameters[row + 4] + qz * parameters[row + 5]
+            b = qx * parameters[row + 6] + qy * parameters[row + 7] + qz * parameters[row + 8]
+            h = qx * parameters[row + 9] + qy * parameters[row + 10] + qz * parameters[row + 11]
+            a, b = a * parameters[row + 12], b * parameters[row + 12]
+            lean = nx * parameters[row + 9] + ny * parameters[row + 10] + nz * parameters[row + 11]
+            score = max(abs(a), abs(b))
+            if not (lean >= least and h >= parameters[row + 13] and h <= parameters[row + 14]):
+                # behind every valid chart
+                score += BEHIND
+            if score < best:
+                best, s, t, number = score, a, b, int(parameters[k])
+        chart[i], uv[0, i], uv[1, i] = number, _bounded(s, beyond), _bounded(t, beyond)
+        # the polar frame of a chart over its tangent plane: the least rotation that takes N to n
+        row = FIRST + CHART * number
+        ex, ey, ez = parameters[row + 3], parameters[row + 4], parameters[row + 5]
+        fx, fy, fz = parameters[row + 6], parameters[row + 7], parameters[row + 8]
+        mx, my, mz = parameters[row + 9], parameters[row + 10], parameters[row + 11]
+        scale = 1.0 / (1.0 + nx * mx + ny * my + nz * mz)
+        mx, my, mz = mx + nx, my + ny, mz + nz
+        turn = (ex * nx + ey * ny + ez * nz) * scale
+        frame[0, i], frame[1, i], frame[2, i] = ex - turn * mx, ey - turn * my, ez - turn * mz
+        turn = (fx * nx + fy * ny + fz * nz) * scale
+        frame[3, i], frame[4, i], frame[5, i] = fx - turn * mx, fy - turn * my, fz - turn * mz
+
+
+@njit(cache=True)
+def grow(starts, frames, longest, points, normals, curvature, first, neighbours, gap, least, facing, most, wider):  # type: ignore[no-untyped-def]
+    """Grow charts from points with numbers ``starts`` (m,) and frames (m, 3, 3), rows E1, E2, N.
+
+    The points (n, 3) have normals (n, 3), largest curvatures (n,) and, in compressed rows, neighbours. A chart of reach
+    r has half width w = r/wider and covers the points reached with rho <= w - gap and n.N >= facing, ``gap`` (n,) being
+    how far others may be from a point. Returns the half widths (m,), where the covered points of each chart begin
+    (m + 1,) in the third array, which lists them, and the bounds of their heights (m, 2).
+    """
+    n, m = len(points), len(starts)
+    seen = np.full(n, -1, np.int64)
+    reached, rho, leans = np.empty(n, np.int64), np.empty(n), np.empty(n)
+    half, begin, heights = np.zeros(m), np.zeros(m + 1, np.int64), np.zeros((m, 2))
+    covered, used = np.empty(16 * n, np.int64), 0
+    for c in range(m):
+        centre, frame = points[starts[c]], frames[c]
+        heap = [(0.0, starts[c])]
+        seen[starts[c]] = c
+        reach, bent, count = 0.0, 0.0, 0
+        while len(heap) > 0:
+            distance, j = heapq.heappop(heap)
+            reach = max(reach, distance)
+            lean = normals[j, 0] * frame[2, 0] + normals[j, 1] * frame[2, 1] + normals[j, 2] * frame[2, 2]
+            bent = max(bent, curvature[j])
+            if not (lean >= least and reach * bent <= most and reach <= longest[c]):
+                break
+            reached[count], rho[count], leans[count] = j, distance, lean
+            count += 1
+            for k in range(first[j], first[j + 1]):
+                other = neighbours[k]
+                if seen[other] != c:
+                    seen[other] = c
+                    qx, qy = points[other, 0] - centre[0], points[other, 1] - centre[1]
+                    qz = points[other, 2] - centre[2]
+                    a = abs(qx * frame[0, 0] + qy * frame[0, 1] + qz * frame[0, 2])
+                    b = abs(qx * frame[1, 0] + qy * frame[1, 1] + qz * frame[1, 2])
+                    heapq.heappush(heap, (max(a, b), other))
+        half[c] = reach / wider
+        while used + count > len(covered):
+            longer = np.empty(2 * len(covered), np.int64)
+            # element by element: to assign one array to another takes seconds to compile
+            for k in range(used):
+                longer[k] = covered[k]
+            covered = longer
+        for k in range(count):
+            j = reached[k]
+            if rho[k] <= half[c]:
+                h = 0.0
+                for axis in range(3):
+                    h += (points[j, axis] - centre[axis]) * frame[2, axis]
+                heights[c, 0], heights[c, 1] = min(heights[c, 0], h), max(heights[c, 1], h)
+            if rho[k] <= half[c] - gap[j] and leans[k] >= facing:
+                covered[used] = j
+                used += 1
+        begin[c + 1] = used
+    return half, begin, covered[:used], heights
