@@ -19,7 +19,8 @@ import numpy as np
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import SurfaceError
 from creeping.field.boundary import Boundary
-from creeping.field.equation.tiles import CUT, POINTS, SIDE, VARYING, WIDE, WIDE_CUT, Tiles, tiles_for, tiles_of
+from creeping.field.equation.parting import CUT, SIDE, VARYING, WIDE, WIDE_CUT, tiles_for, tiles_of
+from creeping.field.equation.tiles import POINTS, Tiles
 from creeping.geometry.covering import patches_of
 from creeping.geometry.patches import SHARP, Patches, chordal, facet_patches, halved, own_triangles, sides_of, turns_of
 from creeping.geometry.piecewise import is_piecewise

@@ -5,7 +5,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.field.equation import tiles
+from creeping.field.equation import parting
 from studies.accuracy import edges
 
 LIMITS = {("cylinder", "hard"): 0.001, ("cylinder", "soft"): 0.001, ("cylinder", "pec"): 0.0015}
@@ -47,7 +47,7 @@ def test_fields_next_to_edges_and_faces_are_those_of_finer_tiles(kind, rng, monk
     x = x[body.level(x) > 0]
     u = cr.solve(body, d, wavenumber=8.0, boundary=kind).near_field(x)
     for name, share in (("SIDE", 0.6), ("TURN", 0.6), ("CUT", 0.3)):
-        monkeypatch.setattr(tiles, name, share * getattr(tiles, name))
+        monkeypatch.setattr(parting, name, share * getattr(parting, name))
     finer = cr.solve(sc.Cone(1.0, 2.0), d, wavenumber=8.0, boundary=kind, seconds=100.0).near_field(x)
     off = np.abs(u.values - finer.values)
     assert np.quantile(off, 0.95) < 0.015 and off.max() < 0.05

@@ -9,8 +9,8 @@ from creeping.field.boundary import CONDUCTOR, scalar_boundaries
 from creeping.field.equation.columns import SplitProduct
 from creeping.field.equation.matrix import Matrix
 from creeping.field.equation.mirrors import blocks_of, no_mirrors
+from creeping.field.equation.parting import tiles_for
 from creeping.field.equation.split_sums import CURL, ONE_LAYER, SPLITS, SmoothKernel, SplitSums, best_split
-from creeping.field.equation.tiles import tiles_for
 from creeping.geometry.covering import patches_of
 
 SPLIT = 3e-5

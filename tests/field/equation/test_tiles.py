@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 from creeping.field.boundary import CONDUCTOR, HARD, Boundary
 from creeping.field.equation.matrix import TANGENT, Matrix, Places
-from creeping.field.equation.tiles import tiles_for
+from creeping.field.equation.parting import tiles_for
 from creeping.geometry.covering import patches_of
 
 HALF = 25 * 29 / 150 * (np.sqrt(1 - (np.linspace(0, 7 / 25, 2001)) ** 2) - 0.96)
