@@ -31,6 +31,19 @@ def _now() -> str:
     return "compiling kernels, once for this installation" if kernels and kernels.is_compiling() else _words
 
 
+def duration(seconds: float) -> str:
+    """Time as people say it.
+
+    Examples
+    --------
+    >>> duration(0.02), duration(42.0), duration(600.0), duration(8000.0)
+    ('a second', '42 s', '10 min', '2.2 h')
+    """
+    if seconds < 90:
+        return "a second" if seconds < 1.5 else f"{seconds:.2g} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.2g} h"
+
+
 class Progress:
     """Progress of one job; a context.
 
@@ -129,9 +142,9 @@ class Progress:
         done, total, told = self._last
         now, doing = time.monotonic(), _now()
         if not total:
-            return f"{self._stage or 'starting'}, {now - self._since:.0f} s" + f": {doing}" * bool(doing)
+            return f"{self._stage or 'starting'}, {duration(now - self._since)}" + f": {doing}" * bool(doing)
         rest = max(self.left() - (now - told), 0.0)
-        left = f", {rest:.0f} s left" if self.left() else f", {now - self._since:.0f} s so far" * (done < total)
+        left = f", {duration(rest)} left" if self.left() else f", {duration(now - self._since)} so far" * (done < total)
         doing = doing if done < total else ""
         return f"{int(done)} of {total}{f' {self.what}' if self.what else ''}{left}" + f": {doing}" * bool(doing)
 

@@ -270,9 +270,8 @@ class Gridded(LevelBody):
     bounds : (2, 3) array_like
         Box spanned by the grid, L; the outermost nodes lie on its faces.
     centre : (3,) array_like, optional
-        Interior point from which the whole surface is visible, L; by default the centre of the bounding box. If slices
-        across the longest side are shifted against each other, the body is sheared first, provided that makes it
-        star-shaped. A body that is not star-shaped needs no centre.
+        Interior point from which the whole surface is visible, L; by default the centre of the bounding box. A bent
+        body is sheared straight first where that makes it star-shaped; others need no centre.
     speed : str or object with ``value`` and ``gradient``, optional
         Speed c(x) of the weighted flow.
 

@@ -80,9 +80,14 @@ def _surface(
     if getattr(shape, "speed", None) is None:
         # of a body six wavelengths across where no wavenumber is given
         k = wavenumber or 6.0 / wavelengths_across(shape, 1.0)
-        told = forecast(shape, k, "hard", **asked)
+        told, conductor = (forecast(shape, k, boundary, **asked) for boundary in ("hard", "pec"))
         answer["field"] = {"body": told.body, "wavenumber": k, "nodes": told.nodes, "by": told.by}
-        texts[:0] = [told.body, f"far field, rigid, at k = {k:.4g}: {told.by}"]
+        answer["field"]["conductor"] = {"nodes": conductor.nodes, "by": conductor.by}
+        texts[:0] = [
+            told.body,
+            f"far field at k = {k:.4g}, rigid: {told.by}",
+            f"far field at k = {k:.4g}, perfect conductor: {conductor.by}",
+        ]
     if why_no_rays(shape):
         answer["repairs"] = list(getattr(shape, "repairs", ()))
         texts += answer["repairs"]
@@ -97,7 +102,10 @@ def _surface(
         known = "quality" in answer
         answer |= {"fit": shape.fit.to_json(), "quality": shape.quality.to_json(), "repairs": list(shape.repairs)}
         if not known:
-            texts += [*shape.repairs, shape.quality.summary(wavenumber)]
+            judged = shape.quality.summary(wavenumber)
+            if report.creases and shape.quality.verdict not in ("smooth", "noisy"):
+                judged = f"one smooth surface through its vertices, which is not taken, would be:\n{judged}"
+            texts += [*shape.repairs, judged]
         texts.append(str(shape.fit))
     texts.append(str(report))
     if wavenumber is not None:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from creeping._progress import duration
 from creeping._typing import ArrayLike, FloatArray
 from creeping.commands.options import WaveOptions
 from creeping.errors import CreepingError, InvalidInputError
@@ -21,7 +22,10 @@ from creeping.geometry.piecewise import has_edges, is_piecewise
 from creeping.geometry.surface import why_no_rays
 
 SOLVED = "errors of 0.01 to 1 % of the largest amplitude (0.1 dB)"
-COARSE = "errors of 0.1 to 3 % of the largest amplitude (0.3 dB), for want of time: coarse tiles and few steps"
+COARSE = (
+    "errors of 0.1 to 3 % of the largest amplitude (0.3 dB), of bodies with fins or narrow gaps up to 25 %, for want "
+    "of time: coarse tiles and few steps"
+)
 """Of the equation and the T-matrix: what they stated on bodies with edges and without."""
 
 
@@ -47,19 +51,6 @@ def boundary_words(*boundaries: BoundaryLike) -> str:
     names = [boundary_name(one) for one in boundaries]
     kinds = {"soft": "soft (pressure release)", "hard": "hard (rigid)", "pec": "perfect conductor"}
     return " and ".join(kinds.get(name, name) for name in names)
-
-
-def duration(seconds: float) -> str:
-    """Time as people say it.
-
-    Examples
-    --------
-    >>> duration(0.02), duration(42.0), duration(600.0), duration(8000.0)
-    ('a second', '42 s', '10 min', '2.2 h')
-    """
-    if seconds < 90:
-        return "a second" if seconds < 1.5 else f"{seconds:.2g} s"
-    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.2g} h"
 
 
 def size_words(shape: Any, wavenumbers: ArrayLike, *, metres: bool, cure: str) -> str:

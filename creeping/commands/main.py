@@ -26,7 +26,7 @@ from creeping.commands.options import Output, each_once, flow_of, parse_body, ti
 app = App(
     name="creeping",
     version=__version__,
-    help="Creeping rays on smooth bodies by the phase flow method. Angles are in degrees.",
+    help="Creeping rays and the scattered field of any closed body, with a measured error. Angles are in degrees.",
     # stars of an expression are no markup
     help_format="plaintext",
     result_action="return_value",
@@ -100,7 +100,8 @@ def run(
     body: options.Body,
     *,
     direction: Annotated[
-        tuple[float, float, float] | None, Parameter(help="Where the wave travels; need not be unit.", group=_wave)
+        tuple[float, float, float] | None,
+        Parameter(help="Where the wave travels, three numbers; need not be unit.", group=_wave),
     ] = None,
     source: Annotated[
         tuple[float, float, float] | None, Parameter(help="Or where a point source is, off the body.", group=_wave)

@@ -42,9 +42,9 @@ Resume = Annotated[
 class WaveOptions:
     """The wave that a field is asked for by."""
 
-    wavenumber: Annotated[float | None, Parameter(help="k, 1/L: asks for the field.")] = None
+    wavenumber: Annotated[float | None, Parameter(help="k, in the inverse of the body's unit of length.")] = None
     frequency: Annotated[
-        str | None, Parameter(help='Instead of k, e.g. "10GHz": lengths are metres then. Of coupling also a band.')
+        str | None, Parameter(help='Instead of k, e.g. "10GHz": lengths are metres then. `coupling` takes bands, too.')
     ] = None
     wavelength: Annotated[str | None, Parameter(help='Instead of k, e.g. "3cm".')] = None
     sound_speed: Annotated[
@@ -230,7 +230,7 @@ def is_file(text: str, folder: Path = Path()) -> bool:
 def title_of(text: str) -> str:
     """Name of a BODY for titles: what was typed, of a file its name, cut if long."""
     name = Path(text).name if is_file(text) else " ".join(text.split())
-    return name if len(name) <= 60 else f"{name[:57]}..."
+    return name if len(name) <= 40 else f"{name[:37]}..."
 
 
 def _with_charts(shape: Any, progress: Tell | None) -> Any:

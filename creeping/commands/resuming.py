@@ -61,6 +61,11 @@ class Unfinished:
         return shlex.join(["creeping", *words, *([] if "--resume" in words else ["--resume"])])
 
     @property
+    def has_results(self) -> bool:
+        """Whether something of it is stored."""
+        return any(self.parts.rglob("c/*")) or any(self.parts.rglob("manifest.json"))
+
+    @property
     def mark(self) -> str:
         """What files say that lack rows."""
         return f"to go on: {self.again}"
@@ -140,7 +145,7 @@ def begun(output: Path, name: str, asked: dict[str, Any], *, resume: bool) -> Un
             raise InvalidInputError(f"{output} was begun otherwise: {'; '.join(names)}; give the same, or another -o")
         if complete and stored:
             return None
-    elif any(found.parts.rglob("c/*")) or any(found.parts.rglob("manifest.json")):
+    elif found.has_results:
         raise InvalidInputError(
             f"{found.parts} has results of a run that has not ended: give --resume to go on with it, or another -o, or "
             "remove it"
@@ -172,7 +177,8 @@ def kept(unfinished: Unfinished, message: Callable[[str], None]) -> Iterator[Non
     try:
         yield
     except (KeyboardInterrupt, CreepingError, OSError, MemoryError):
-        message(f"what is done is kept; {unfinished.mark}")
+        there = "what is done is kept" if unfinished.has_results else "no value was done yet, so all begins anew"
+        message(f"{there}; {unfinished.mark}")
         raise
     finally:
         if main:

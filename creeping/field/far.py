@@ -54,9 +54,9 @@ from creeping.rays.uncertain_body import coarse_factor, coarse_fan
 from creeping.storage.memory import blocks, within_budget
 from creeping.storage.parts import Keeping, not_kept
 
-KEPT_BYTES, RAY_BYTES, FAN_BYTES = 1000.0, 24_000.0, 200.0
-"""Of a direction: its field, of a conductor, twice while parts are joined; what rays take, twice as the geometry of the
-directions before is kept; and for each k size, the fan integral."""
+LEAST_BYTES, KEPT_BYTES, RAY_BYTES, FAN_BYTES = 250.0, 1000.0, 33_000.0, 200.0
+"""Of a direction: its field by any way, of a conductor thrice that; by rays, twice while parts are joined; what rays
+take, twice as the geometry of the directions before is kept; and for each k size, the fan integral."""
 
 TOGETHER = 1024
 """Directions by rays that are kept at a time: some seconds of work."""
@@ -76,8 +76,8 @@ def far_field(
     Parameters
     ----------
     fan : RayFan
-        Its rays must be long enough to pass the places where waves leave towards the observers. Longer paths are left
-        out.
+        Its rays must be long enough to pass the places where waves leave towards the observers. Paths longer than the
+        rays are left out.
     observation : (..., 3)
         Directions r from the body to the observers; need not be unit. Flattened to (m, 3).
     wavenumber : float, 1/L
@@ -105,7 +105,7 @@ def far_field(
         On bad directions, wavenumber, boundary, order or method, for a weighted body, or if
         method="equation" and the body has edges, is rough or needs too many nodes.
     SurfaceError
-        If currents are requested and the wavenumber is too high for any mesh of the body.
+        If currents are requested and the wavenumber is so high that no mesh of the body resolves the wave.
 
     Examples
     --------
@@ -138,6 +138,8 @@ def far_in_parts(
     k = checked(wavenumber, order, fan.body)
     checked_method(method, order)
     r = observers_of(observation)
+    least = LEAST_BYTES * (3 if boundary == "pec" else 1)
+    within_budget(least * len(r), f"the field in {len(r)} directions", "ask for fewer", asked=len(r))
     piecewise = is_piecewise(fan.body)
     currents = far_currents(Problem(fan, k, boundary, order, method), len(r))
     if currents:
@@ -145,9 +147,6 @@ def far_in_parts(
         left_out = tip_waves(fan, k) if piecewise and not currents.solved else 0.0
         far = far_by_currents(currents, r, boundary, left_out=left_out, keep=keep)
         return replace(far, validity=validity(fan, wavenumber=k))
-    if piecewise:
-        far = _kept(keep, "optics", partial(piecewise_far_field, fan, r, k, boundary, order))
-        return replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
     within_budget(KEPT_BYTES * len(r), f"the field in {len(r)} directions", "ask for fewer", asked=len(r))
     # what is kept has the same parts whatever memory is free
     each = RAY_BYTES + FAN_BYTES * k * size(fan.body)
@@ -155,11 +154,13 @@ def far_in_parts(
     parts = blocks(len(r), each) if keep is not_kept else [slice(first, first + TOGETHER) for first in firsts]
 
     def some_of(some: slice) -> FarField:
+        if piecewise:
+            return piecewise_far_field(fan, r[some], k, boundary, order)
         return field_of(far_geometry(fan, r[some]), k, boundary, order)
 
     far = FarField.joined([_kept(keep, f"rays-{some.start}", partial(some_of, some)) for some in parts])
     far = replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
-    auto = method == "auto" and order == 2 and len(r) > 0
+    auto = method == "auto" and order == 2 and len(r) > 0 and not piecewise
     level = measured_level(fan, k, boundary) if auto else None
     return level.applied(far) if level else far
 

@@ -184,6 +184,8 @@ def _parsed(text: str) -> tuple[FloatArray, float, bool]:
     first, last, step = numbers
     if not (step > 0 and first > 0 and np.isfinite(last) and last >= first):
         raise InvalidInputError(f"{text!r} is no range: give first:last:step, positive, the first not above the last")
+    if first < last < first + step * (1 - 1e-9):
+        raise InvalidInputError(f"{text!r} has a step longer than the band; give one of {last - first:g} or less")
     if not (last - first) / step < MOST:
         raise InvalidInputError(f"{text!r} has {(last - first) / step + 1:.3g} values; {MOST} are the most")
     values = first + step * np.arange(int((last - first) / step + 1e-9) + 1)

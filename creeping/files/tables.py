@@ -17,6 +17,7 @@ from creeping.field.results.point_result import FieldStatus
 from creeping.geometry.checks import UNKNOWN, unit_of
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
+from creeping.rays.status import RayStatus
 from creeping.shadow.line import ShadowLine
 from creeping.storage.atomic import written_aside
 
@@ -146,7 +147,7 @@ def _fan_columns(fan: RayFan) -> list[Column]:
         ("dJ", "its rate along the ray", np.ravel(fan.spreading_rate)),
         ("kappa_n", f"normal curvature along the ray, 1/{unit}, positive where convex", np.ravel(fan.curvature)),
         ("caustic_index", "zeros of J passed", np.ravel(fan.caustic_index)),
-        ("status", "status code of the ray", np.repeat(fan.status, steps)),
+        ("status", ", ".join(f"{int(one)} {one.name}" for one in RayStatus), np.repeat(fan.status, steps)),
     ]
 
 
@@ -183,7 +184,7 @@ def _cut_columns(cut: Any) -> list[Column]:
     for name, values in fields.items():
         columns.append((f"re_{name}", f"real part of {name}, {field.unit}; {_wave_words(field, unit)}", values.real))
         columns.append((f"im_{name}", "imaginary part", values.imag))
-    states = "0 OK, 1 LIT, 2 CAUSTIC, 3 NO_RAY, 4 DETACHED, 5 TRUNCATED, 6 UNRESOLVED"
+    states = ", ".join(f"{int(one)} {one.name}" for one in FieldStatus)
     return [
         *columns,
         ("error", f"of the field, {field.unit}", field.error),
@@ -286,7 +287,7 @@ def write_echo(path: str | os.PathLike[str], echo: "Echo", *, known: BoolArray |
         columns.append((f"{part}_re_m", f"{part} part of f", values[at].real))
         columns.append((f"{part}_im_m", f"{part} part of f", values[at].imag))
     doubt = "1 where an expansion fails or the error is large"
-    method = "rays, currents, or rays+optics of a body with edges, joints or tips"
+    method = "rays; rays+optics of a body with edges; currents of all of it, by expansions or its equation; t-matrix"
     columns.append(("unresolved", doubt, echo.unresolved[at].astype(int)))
     columns.append(("method", method, np.where(by_currents, "currents", echo.otherwise)))
     _write_table(path, columns, mark)

@@ -75,7 +75,11 @@ class SurfaceReport:
             raise SurfaceError(f"{len(failed)} of {len(self.checks)} checks of the body failed: " + "; ".join(failed))
 
     def __repr__(self) -> str:
-        rows = [f"  {'ok ' if c.ok else 'BAD'} {c.name}: {c.worst:.2g} (limit {c.limit:.2g})" for c in self.checks]
+        rows = [f"  BAD {c.name}: {c.worst:.2g} (limit {c.limit:.2g}); {c.remedy}" for c in self.checks if not c.ok]
+        if held := len(self.checks) - len(rows):
+            closest = max((c for c in self.checks if c.ok), key=lambda c: c.worst / c.limit if c.limit else 0.0)
+            nearest = f"{closest.name}: {closest.worst:.2g} (limit {closest.limit:.2g})"
+            rows.append(f"  ok  {held} of {len(self.checks)} checks; nearest to its limit is {nearest}")
         counts = Counter(crease.kind for crease in self.creases)
         meeting = [f"{counts[kind]} {kind}{'s' * (counts[kind] > 1)}" for kind in KINDS if counts[kind]]
         made = ", ".join([f"{self.pieces} smooth pieces", *meeting]) if self.genus is None else f"genus {self.genus}"

@@ -103,7 +103,7 @@ class PhaseMap(Drawn):
     ----------
     body : Surface
     model : Model
-        Coordinates in which maps are composed.
+        Coordinates in which maps are composed, and the simple motion that they are stored relative to.
     grid : Grid
     leaps : tuple of Leap
         Maps by ascending time; the last is g_T0. Only ``method="tower"`` has more than one.

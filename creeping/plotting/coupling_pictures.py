@@ -6,6 +6,7 @@ Sources: Derivations, F25.
 """
 
 import os
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -156,8 +157,8 @@ def plot_coupling(
         rows, columns = np.nonzero(doubtful)
         ax.plot(columns, rows, "x", color="#d55e00", markersize=9 if numbered else 4, label="not OK")
     pages.add_bar(ax.figure, image, _level_name(found), extend=pages.beyond(levels, low, high), fontsize=9, ax=ax)
-    ax.set_xlabel("receiver", fontsize=9)
-    ax.set_ylabel("source", fontsize=9)
+    ax.set_xlabel("to port", fontsize=9)
+    ax.set_ylabel("from port", fontsize=9)
     ax.tick_params(labelsize=8, width=0.5)
     ax.xaxis.get_major_locator().set_params(integer=True)
     ax.yaxis.get_major_locator().set_params(integer=True)
@@ -219,16 +220,17 @@ def plot_coupling_band(
         ax.plot(x, decibels(size), **style | {"alpha": 0.35})
         ax.plot(x, np.where(ok, decibels(size), np.nan), label=label, **style)
         low = decibels(np.maximum(size - off, 1e-3 * size))
-        ax.fill_between(x, low, decibels(size + off), color=style["color"], alpha=0.14, linewidth=0)
+        told = "_" if number else "stated error"
+        ax.fill_between(x, low, decibels(size + off), color=style["color"], alpha=0.14, linewidth=0, label=told)
         curves.append(decibels(size))
     ax.set_ylim(*shown_range(curves, span))
     pages.dressed(ax, f"frequency ({unit})" if hertz is not None else f"k ({unit})", _level_name(found[0]))
-    return pages.finished(ax, fresh, found[0].boundary, legend)
+    return pages.finished(ax, fresh, "perfect conductor" if found[0].boundary == "pec" else "hard body", legend)
 
 
 def _level_name(found: "Coupling") -> str:
-    per = found.unit if found.unit.startswith("1/") else f"1 {found.unit}"
-    return f"20 log$_{{10}}$ (dB re {per})"
+    unit = re.sub(r"\^?(-?\d+)$", r"$^{\1}$", found.unit)
+    return f"coupling of unit moments (dB re {unit if unit.startswith('1/') else f'1 {unit}'})"
 
 
 def plot_pattern(found: "SourcePattern", ax: Any = None, *, span: float = 60.0, legend: bool | None = None) -> Any:

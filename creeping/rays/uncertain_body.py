@@ -28,7 +28,7 @@ from creeping.storage.memory import within_budget
 
 @dataclass(frozen=True)
 class BodyUncertainty:
-    """Rms differences between rays on a body and on its second fit at their last steps, times ``coarse_factor``.
+    """Rms differences of rays on the two fits of a body, at the rays' ends, scaled to the error of the finer fit.
 
     Attributes
     ----------

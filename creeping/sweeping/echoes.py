@@ -83,7 +83,7 @@ def backscatter(
     resume : bool
         Continue an existing store.
     rows : callable, optional
-        With a store: called from time to time with the `creeping.sweeping.blocks.Rows` computed so far.
+        With a store: called every few seconds with the values known so far, `creeping.sweeping.blocks.Rows`.
     progress : callable or bool, optional
         True shows a bar. A callable is called as ``progress(done, total, seconds)``, see `creeping.sweep_directions`.
 

@@ -2,18 +2,30 @@
 
 import json
 import re
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
 import shared_bodies as sc
 from command_line import ran, table
 
+import creeping.plotting.pages
 from creeping.commands.echo_request import echo_request
 from creeping.commands.forecast import forecast
 from creeping.errors import InvalidInputError
 
 
-def test_band_of_a_sphere_with_a_comparison(tmp_path, capsys):
+def test_band_of_a_sphere_with_a_comparison(tmp_path, capsys, monkeypatch):
+    titles = {}
+    drawn = creeping.plotting.pages.written_figure
+
+    @contextmanager
+    def figures(path, *given):
+        with drawn(path, *given) as figure:
+            yield figure
+            titles[path.name] = [ax.get_title() for ax in figure.axes]
+
+    monkeypatch.setattr("creeping.plotting.pages.written_figure", figures)
     given = tmp_path / "given.csv"
     # geometrical optics: pi radius^2
     given.write_text(
@@ -33,6 +45,9 @@ def test_band_of_a_sphere_with_a_comparison(tmp_path, capsys):
     assert sorted(p.name for p in out.iterdir()) == sorted(summary["files"])
     assert {"rcs.csv", "rcs.png", "range.csv", "range.png", "compared.png"} <= set(summary["files"])
     assert [row["channel"] for row in table(out / "rcs.csv")[::17]] == ["HH", "VV"]
+    for name in ("rcs.png", "range.png", "compared.png"):
+        (title,) = filter(None, titles[name])
+        assert title.startswith("sphere:radius=0.15, azimuth 0°, elevation 0°; error ") and title.endswith("median")
 
 
 def test_map_of_target_strength_without_pictures(tmp_path, capsys):

@@ -35,9 +35,9 @@ def test_lines_come_by_themselves(hasty, monkeypatch, capsys):
         progress.told(10, 10)
     lines = capsys.readouterr().err.splitlines()
     assert lines[0] == "creeping: a fit of the mesh ..."
-    assert lines[1] == "creeping: a fit of the mesh, 1 s"
+    assert lines[1] == "creeping: a fit of the mesh, a second"
     assert "compiling kernels" in lines[2]
-    assert re.fullmatch(r"creeping: 4 of 10 values, \d s left: factors of block 1", lines[-2]), lines
+    assert re.fullmatch(r"creeping: 4 of 10 values, (\d s|a second) left: factors of block 1", lines[-2]), lines
     assert lines[-1] == "creeping: 10 of 10 values"
 
 

@@ -55,12 +55,10 @@ class FarField(Drawn, Tabled):
         edges). For sums over rays: how the creeping part was computed, "forward", "rays", "fan", or several joined
         by "+".
     unresolved : (m,) of bool
-        Sums over rays: True if a contribution above a twentieth of the field comes from an expansion that fails,
-        namely at a caustic of creeping rays that the fan integral does not cover, at a caustic of the reflected field
-        (a specular point on a nearly flat region), or in a forward lobe without bisector contour (a concave region)
-        or whose rim the body hides in part; if rays that end too early may lack as much
-        (`creeping.field.waves.likely_cells`); or if k times the radius of curvature is below 4 and the error exceeds
-        half the sum of all contributions. Currents: True if the error exceeds a tenth of the largest |f|.
+        Sums over rays: True if more than a twentieth of the field is missing or not to be trusted: at caustics of
+        creeping or reflected rays, in the forward lobe of a body that is not convex, where rays end too early; or if
+        k times the radius of curvature is below 4 and the error exceeds half the sum of all contributions. Currents:
+        True if the error exceeds a tenth of the largest |f|.
     error : (m,) or (m, 2, 2), L
         Error of |f|. It covers 95 % of directions; NaN where it is not known.
     error_by : str

@@ -363,7 +363,8 @@ def _sizes(waves: ComplexArray | FloatArray) -> FloatArray:
 
 def _weighted(share: FloatArray, wave: ComplexArray) -> ComplexArray:
     """Product, 0 where the share is 0 even if the wave is infinite there."""
-    return np.asarray(np.where(share != 0, share * np.where(share != 0, wave, 0.0), 0.0))
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.where(share != 0, share * np.where(share != 0, wave, 0.0), 0.0))
 
 
 def _methods(forward: FloatArray, fan: FloatArray) -> np.ndarray[Any, np.dtype[np.str_]]:
