@@ -200,7 +200,7 @@ def monostatic_method(body: Surface, wavenumbers: FloatArray, boundary: Boundary
     solved = why_no_rays(body) or is_piecewise(body)
     if not solved and not is_rough(body):
         solved = not is_reached(body, float(np.min(wavenumbers)))
-    return "t-matrix" if solved and all(pays(body, k, boundary, incidences) for k in wavenumbers) else "auto"
+    return "t-matrix" if solved and pays(body, wavenumbers, boundary, incidences) else "auto"
 
 
 def _angles(azimuth: ArrayLike, elevation: ArrayLike) -> tuple[FloatArray, FloatArray]:

@@ -29,7 +29,7 @@ from creeping.field.problem import Problem
 from creeping.field.results.far_result import FarField
 from creeping.field.routes import far_currents
 from creeping.field.tmatrix.computing import kept_t_matrix
-from creeping.field.validity_range import launch_validity, validities
+from creeping.field.validity_range import is_reached, launch_validity, validities
 from creeping.field.waves.far_geometry import FarGeometry
 from creeping.field.waves.far_rays import Parts, parts_of
 from creeping.geodesics.equations import natural_horizon
@@ -248,7 +248,11 @@ class Sweeper:
             boundary = parse_boundary(name)
             made.append(parts_of(geometry, wavenumber, boundary, request.order))
             field = FieldArrays.of(made[-1].field(boundary), len(rows))
-            for number in field.unclear if request.method == "auto" else ():
+            unclear = field.unclear if request.method == "auto" else np.arange(0)
+            if len(unclear) > 1 and not is_reached(self.body, wavenumber):
+                # expansions of the currents will fail for most of them
+                solve_together(self.body, directions[unclear], wavenumber, boundary)
+            for number in unclear:
                 other = _by_currents(fans(number), observers[number], wavenumber, boundary)
                 if other is not None and field.improved_by(number, other):
                     field.replace(number, other)

@@ -242,10 +242,15 @@ def _refuse(plan: Plan, what: str, seconds: float) -> None:
         )
 
 
-def pays(body: Surface, wavenumber: float, boundary: BoundaryLike, incidences: int) -> bool:
-    """Whether a T-matrix takes less time than the equation of so many incidences, which is not refused."""
-    equation, plan = plan_of(body, wavenumber, boundary, incidences=incidences), expected(body, wavenumber, boundary)
-    return not equation.refused and plan.memory <= budget() and plan.seconds < min(SECONDS, equation.seconds)
+def pays(body: Surface, wavenumbers: FloatArray, boundary: BoundaryLike, incidences: int) -> bool:
+    """Whether T-matrices take less time in all than the equations of so many incidences, which are not refused."""
+    left = 0.0
+    for k in wavenumbers.tolist():
+        equation, plan = plan_of(body, k, boundary, incidences=incidences), expected(body, k, boundary)
+        if equation.refused or not (plan.memory <= budget() and plan.seconds < SECONDS):
+            return False
+        left += equation.seconds - plan.seconds
+    return left > 0
 
 
 def known_t_matrix(body: Surface, wavenumber: float, boundary: BoundaryLike) -> TMatrix | None:
