@@ -14,7 +14,7 @@ from creeping.errors import CreepingError, StoredMapError
 from creeping.geodesics.integrator import ErrorEstimate
 from creeping.geometry.arguments import checked_body, folder_path
 from creeping.geometry.surface import Surface, fingerprint
-from creeping.kernels.private_cache import private_folder, require_private
+from creeping.kernels.cache import private_folder, require_private
 from creeping.phaseflow.coordinates.base import Model, model_of
 from creeping.phaseflow.coordinates.rotation import CompiledModel
 from creeping.phaseflow.phase_map import ErrorGrowth, PhaseMap

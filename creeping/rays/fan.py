@@ -24,8 +24,7 @@ from creeping.errors import InvalidInputError
 from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.equations import points_of_charts
 from creeping.geodesics.integrator import ErrorEstimate, trace_states
-from creeping.geodesics.piece_trace import Passages
-from creeping.geodesics.pieces import passages, trace_pieces
+from creeping.geodesics.pieces import Passages, passages, trace_pieces
 from creeping.geodesics.states import ATTENUATION, P, X, known_steps, pack, whole_lanes
 from creeping.geometry.arguments import flag, one_of, real_number, whole_number
 from creeping.geometry.checks import unit_of

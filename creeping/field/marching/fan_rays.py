@@ -34,8 +34,8 @@ from creeping.field.boundary import Boundary
 from creeping.field.marching.profile import LEAST_NODES, RayProfiles
 from creeping.field.waves.far_geometry import fan_strips
 from creeping.field.waves.shed_wave import smoothstep
+from creeping.geodesics.attenuation import trace_own
 from creeping.geodesics.integrator import trace_states
-from creeping.geodesics.own_times import trace_own
 from creeping.geodesics.pieces import trace_pieces
 from creeping.geodesics.states import M11, M21, WITH_JACOBI, P, X, pack
 from creeping.geometry.curvature import normal_curvature

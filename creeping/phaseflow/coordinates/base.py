@@ -161,7 +161,7 @@ class AmbientModel:
         return out
 
     def _compose(self, grid: Grid, leap: Leap, states: FloatArray, count: int) -> None:
-        from creeping.phaseflow.kernels.ambient import leap as kernel
+        from creeping.phaseflow.kernels.composition import leap_in_space
 
         off = PROJECTION * size(self.body)
         tables = leap.state, leap.jacobi, grid.degree, grid.origin, grid.cells
@@ -170,7 +170,8 @@ class AmbientModel:
             def run(part: slice) -> None:
                 # a map composed with itself in place may be left in between
                 for done in range(0, count, TOGETHER):
-                    kernel(*place, *parts[:2], *tables, leap.time, min(TOGETHER, count - done), off, states[part])
+                    some = min(TOGETHER, count - done)
+                    leap_in_space(*place, *parts[:2], *tables, leap.time, some, off, states[part])
                     pause()
 
             in_threads(run, len(states))

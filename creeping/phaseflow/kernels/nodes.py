@@ -13,17 +13,8 @@ import math
 import numpy as np
 from numba import njit
 
-from creeping.geodesics.kernels.attenuation import SAMPLES
-from creeping.kernels.block import BLOCK, aligned, entry_options, options
-from creeping.phaseflow.kernels.composition import (
-    ANGLES,
-    INTERPOLATED,
-    WORK,
-    extend_some,
-    leap_block,
-    move,
-    place_block,
-)
+from creeping.kernels.block import BLOCK, entry_options, options
+from creeping.phaseflow.kernels.composition import Kind, extend_some, leap_block, move, place_block, workspace
 from creeping.phaseflow.kernels.rotation import read_block
 
 
@@ -33,9 +24,7 @@ def double(kind, leap, degree, scale, shift, nodes, displacement, matrices, curv
 
     The leap is not packed.
     """
-    r, m, d = aligned(4, BLOCK), aligned(6, BLOCK), np.zeros((INTERPOLATED, 4))
-    work, uva, w = aligned(WORK, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK)
-    place, cell, mine = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
+    r, m, work, uva, w, d, place, cell, mine, _, _ = workspace()
     # no ray detaches from a node
     m[5, :] = math.inf
     n = nodes.shape[0]
@@ -48,7 +37,7 @@ def double(kind, leap, degree, scale, shift, nodes, displacement, matrices, curv
                 r[k, i] = nodes[start + min(i, count - 1), k]
             m[0, i], m[1, i], m[2, i], m[3, i] = 1.0, 0.0, 0.0, 1.0
             # the displacement from the identity is what two moves make of it
-            whole[0, i], whole[1, i], whole[2, i], whole[3, i] = 0.0 if kind == ANGLES else 1.0, 0.0, 0.0, 0.0
+            whole[0, i], whole[1, i], whole[2, i], whole[3, i] = 0.0 if kind == Kind.ANGLES else 1.0, 0.0, 0.0, 0.0
         for half in range(2):
             place_block(kind, r.reshape(-1), work, leap[0], degree, scale, shift, uva, place, cell)
             leap_block(kind, leap, extras, degree, uva, place, work[7], count, r, m, w, d, mine)
@@ -77,10 +66,7 @@ def flow_ordered(
     """
     n, more = rays.shape[0], rays.shape[1] - 4
     table, extras = leap[0], (rays.shape[1] - 2) // 4
-    r, m, sampled = aligned(4, BLOCK), aligned(6, BLOCK), aligned(SAMPLES, BLOCK)
-    work, uva, w, d = aligned(WORK, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK), np.zeros((INTERPOLATED, 4))
-    place, cell, bent = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
-    a = aligned(2, BLOCK)
+    r, m, work, uva, w, d, place, cell, bent, a, sampled = workspace()
     odd = np.zeros(BLOCK)
     flat, order = ray.reshape(-1), np.empty(n, np.int64)
     # a whole number times the next number above 1/na never falls below the quotient, and division is slow
@@ -143,12 +129,8 @@ def _put(flat, mine, r, uva, place, odd, inverse, bucket, ends):
     for i in range(mine.shape[0]):
         at = 8 * mine[i]
         flat[at], flat[at + 1], flat[at + 2], flat[at + 3] = r[0, i], r[1, i], r[2, i], r[3, i]
-        flat[at + 4], flat[at + 5], flat[at + 6], flat[at + 7] = (
-            uva[0, i],
-            uva[1, i],
-            uva[2, i],
-            place[i] + 0.5 * odd[i],
-        )
+        flat[at + 4], flat[at + 5], flat[at + 6] = uva[0, i], uva[1, i], uva[2, i]
+        flat[at + 7] = place[i] + 0.5 * odd[i]
     for i in range(mine.shape[0]):
         number = np.int32(place[i] * inverse)
         bucket[mine[i]] = number

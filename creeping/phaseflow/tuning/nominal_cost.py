@@ -15,15 +15,15 @@ Sources: Derivations, R16.
 import numpy as np
 
 from creeping._typing import Any
-from creeping.geodesics.attenuation import FINE_GAUSS, fine_spacing
+from creeping.geodesics.attenuation import NODES, fine_spacing
 from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geodesics.equations import natural_horizon
-from creeping.geodesics.integrator import counted_states
+from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
 from creeping.geometry.evaluators import speed_of
 from creeping.geometry.surface import Surface
-from creeping.kernels.threads import CHUNK
+from creeping.kernels.threads import BLOCK
 from creeping.phaseflow.building import Plan
 from creeping.phaseflow.coordinates.base import Model
 from creeping.phaseflow.phase_map import PhaseMap
@@ -78,8 +78,9 @@ def tracing_cost(body: Surface) -> float:
     """Nominal seconds of direct integration at 1e-9 per ray and unit of length, the steps of 256 rays being counted."""
     length, rays = natural_horizon(body), 256
     states = pack(*random_bundle_points(body, rays, rng=np.random.default_rng(0)))
-    _, steps = counted_states(body, states, np.array([length]), rtol=1e-9, step=length / 4)
-    return steps * CHUNK * STAGES * (stage_seconds(body) + ADAPTING) / (rays * length)
+    steps: list[int] = []
+    trace_states(body, states, np.array([length]), rtol=1e-9, step=length / 4, taken=steps)
+    return sum(steps) * BLOCK * STAGES * (stage_seconds(body) + ADAPTING) / (rays * length)
 
 
 def direct_seconds(flow: DirectFlow, length: float, n_steps: int, *, carry_jacobi: bool) -> float:
@@ -91,7 +92,7 @@ def direct_seconds(flow: DirectFlow, length: float, n_steps: int, *, carry_jacob
     spacing = fine_spacing(body, flow.rtol, step)
     fine = n_steps * _steps(length / n_steps, spacing)
     steps = fine * _steps(length / fine, step)
-    samples = fine * (2 + FINE_GAUSS)
+    samples = fine * NODES
     return steps * STAGES * stage_seconds(body, jacobi=True) + samples * (evaluation_seconds(body) + SAMPLE)
 
 
