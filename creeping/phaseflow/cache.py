@@ -15,10 +15,10 @@ from creeping.geodesics.integrator import ErrorEstimate
 from creeping.geometry.arguments import checked_body, folder_path
 from creeping.geometry.surface import Surface, fingerprint
 from creeping.kernels.cache import private_folder, require_private
-from creeping.phaseflow.coordinates.base import Model, model_of
-from creeping.phaseflow.coordinates.rotation import CompiledModel
+from creeping.phaseflow.coordinates import Model, model_of
 from creeping.phaseflow.phase_map import ErrorGrowth, PhaseMap
-from creeping.phaseflow.splines import PACKED, Grid, Leap
+from creeping.phaseflow.rotation import CompiledModel
+from creeping.phaseflow.splines import Grid, Leap
 from creeping.storage.folder import SCHEMA, content_digest, open_array, read_manifest
 
 
@@ -119,7 +119,7 @@ def _check_shapes(folder: Path, grid: Grid, leaps: tuple[Leap, ...], model: Mode
         fits &= leap.centre.shape == (model.lanes,)
         fits &= leap.curvature.shape in ((*whole, 8), (0, *grid.sides, 8)) and leap.curvature.dtype == leap.state.dtype
         packed = leap.is_packed and leap.has_curvature and isinstance(model, CompiledModel)
-        shapes = ((*whole, PACKED),) if packed else ((*whole, 4), (0, *grid.sides, 4))
+        shapes = ((*whole, 8),) if packed else ((*whole, 4), (0, *grid.sides, 4))
         fits &= leap.jacobi.shape in shapes and leap.jacobi.dtype == leap.state.dtype
         fits &= leap.matrix.shape == leap.jacobi.shape[4:]
         fits &= leap.flagged.shape == (whole if packed else (0, *grid.sides)) and leap.flagged.dtype == np.uint8

@@ -32,19 +32,13 @@ from creeping.geometry.curvature import gaussian_curvature, normal_curvature
 from creeping.geometry.evaluators import speed_of, speed_values
 from creeping.geometry.piecewise import has_edges, is_piecewise
 from creeping.geometry.surface import Surface, fingerprint, memo, size
-from creeping.rays.ends import FEW_RAYS, Losses, Starts, ends_of, outline_share
+from creeping.rays.ends import AT_CREASES, ENDED, FEW_RAYS, Losses, RayStatus, Starts, ends_of, outline_share
 from creeping.rays.reach import AUTO, HARD_DECAY, IN_RANGE, ray_length
-from creeping.rays.status import AT_CREASES, LAUNCHED, LINE_STATUS, RayStatus
 from creeping.rays.transport import Flow, carried, checked_flow, spread, zeros_passed
 from creeping.shadow.attachment import LaunchPoints, line_tangents
 from creeping.shadow.line import ShadowLine, checked_launch_from
-from creeping.shadow.status import NO_RAY
+from creeping.shadow.status import ATTACHED, CONCAVE, NO_RAY, OCCLUDED
 from creeping.storage.memory import within_budget
-
-MAX_RAYS, GROWTH, HALVED = 200_000, 32, 4
-"""Rays beyond which refinement stops, also in units of those asked for, unless few; halvings of gaps at edges."""
-CHECKED_RAYS = 16
-"""Rays that are traced directly to measure the error of a fan."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -148,7 +142,7 @@ class RayFan(DrawnOnBody):
     @property
     def launched(self) -> BoolArray:
         """Whether the incident wave launched each ray, even if the ray ended early: (rays,)."""
-        return np.isin(self.status, LAUNCHED)
+        return np.isin(self.status, (RayStatus.OK, *ENDED))
 
     @cached_property
     def crossings(self) -> Passages:
@@ -267,7 +261,8 @@ def launch(
     times = np.linspace(0.0, length, steps + 1)
     starts = Starts.of(line, n_rays, launch_from)
     states = _carry(flow, line, starts, times)
-    most, passes = min(MAX_RAYS, max(GROWTH * len(starts.arc), FEW_RAYS)), HALVED if has_edges(body) else MAX_RAYS
+    # next to edges gaps are halved four times
+    most, passes = min(200_000, max(32 * len(starts.arc), FEW_RAYS)), 4 if has_edges(body) else 200_000
     for _ in range(0 if np.isinf(gap) else passes):
         arc, position = starts.parting(states[..., X], gap, known_steps(states, times))
         if not len(arc) or len(starts.arc) + len(arc) > most:
@@ -331,7 +326,9 @@ def ray_arrays(body: Surface, launch: LaunchPoints, states: FloatArray, times: F
     directions = launch.headings[there]
     tangents = None if speed_of(body) is None else line_tangents(body, points, directions)
     J, rate, stalled = spread(body, points, tangents, directions, launch.openings[there], path)
-    begun = np.array([LINE_STATUS[k] for k in sorted(LINE_STATUS)])[launch.state[there].astype(int)]
+    begun = np.zeros(3, dtype=np.int64)
+    begun[[ATTACHED, OCCLUDED, CONCAVE]] = RayStatus.OK, RayStatus.OCCLUDED, RayStatus.CONCAVE
+    begun = begun[launch.state[there].astype(int)]
     status, first = ends_of(body, points, path, times, begun)
     status[stalled] = RayStatus.STALLED
 
@@ -386,7 +383,7 @@ def end_error(fan: RayFan) -> ErrorEstimate:
     """Error of (x, p) at the end of a fan, against direct integration of evenly chosen rays from their start."""
     if not len(fan.points):
         return ErrorEstimate(0.0, 0.0, 0)
-    chosen = np.unique(np.linspace(0, len(fan.points) - 1, CHECKED_RAYS).astype(int))
+    chosen = np.unique(np.linspace(0, len(fan.points) - 1, 16).astype(int))
     first = pack(fan.points[chosen, 0], fan.directions[chosen, 0])
     # a thousandth of what is to be measured
     rms = np.nan if fan.flow.error is None else fan.flow.error.rms

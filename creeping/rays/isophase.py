@@ -29,14 +29,8 @@ from creeping.geometry.checks import UNKNOWN, unit_of
 from creeping.geometry.evaluators import speed_of, speed_values
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import project
+from creeping.rays.ends import AT_CREASES
 from creeping.rays.fan import RayFan
-from creeping.rays.status import AT_CREASES
-
-MOST_LEVELS = 100_000
-"""Levels of one call."""
-
-POLE_JUMP = np.pi / 2
-"""Step of an angle, seams apart, that only the passage of a pole makes on a well sampled curve."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -141,8 +135,8 @@ def iso_phase_curves(
     values = np.atleast_1d(real_array(levels, "levels"))
     if values.ndim != 1 or not np.all(np.isfinite(values)):
         raise InvalidInputError("levels must be finite numbers, one or a list of them")
-    if len(values) > MOST_LEVELS:
-        raise InvalidInputError(f"{len(values)} levels are more than {MOST_LEVELS}; ask for fewer")
+    if len(values) > 100_000:
+        raise InvalidInputError(f"{len(values)} levels are more than 100000; ask for fewer")
     beyond_detachment = flag(beyond_detachment, "beyond_detachment")
     if not len(fan.points):
         return []
@@ -246,14 +240,16 @@ def split_at_seam(parameters: FloatArray, *, closed: bool) -> list[FloatArray]:
         Pieces in order; no step of a piece exceeds pi/2.
     """
     path = np.concatenate([parameters, parameters[:1]]) if closed else parameters
-    if np.all(np.abs(np.diff(path, axis=0)) <= POLE_JUMP):
+    # a longer step, seams apart, only the passage of a pole makes on a well sampled curve
+    longest = np.pi / 2
+    if np.all(np.abs(np.diff(path, axis=0)) <= longest):
         return [np.array(path)] if len(path) > 1 else []
     pieces: list[FloatArray] = []
     current = [path[0]]
     for after in path[1:]:
         jump = after - current[-1]
         short = jump - 2 * np.pi * np.round(jump / (2 * np.pi))
-        if np.any(np.abs(short) > POLE_JUMP):
+        if np.any(np.abs(short) > longest):
             pieces.append(np.array(current))
             current = [after]
             continue

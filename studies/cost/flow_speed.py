@@ -27,7 +27,7 @@ from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack
 from creeping.geometry.surface import normal
 from creeping.phaseflow.building import measure
-from creeping.phaseflow.tuning.request import tuned_direct
+from creeping.phaseflow.request import tuned_direct
 from studies import Row, main
 from studies.accuracy.bodies import rms
 

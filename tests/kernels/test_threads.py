@@ -18,7 +18,7 @@ from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.states import pack
 from creeping.kernels import threads
 from creeping.kernels.threads import in_slices, in_threads
-from creeping.phaseflow.coordinates import rotation
+from creeping.phaseflow import rotation
 from tests.plain_body import PlainEllipsoid
 
 

@@ -180,8 +180,8 @@ def wide_rows(fan: RayFan) -> list[IntArray]:
 def _attenuation_slopes(strip: Strip, times: FloatArray) -> FloatArray:
     """dA/dsigma_perp of the rays of a strip at times of their own (rays, m), sigma_perp along b."""
     sigma = strip.positions
-    slopes = strip.attenuation_slopes(np.repeat(sigma, times.shape[1]), times.ravel()).reshape(times.shape)
-    along = strip.slopes(sigma, np.zeros(len(sigma)))[0][:, :3]
+    slopes = strip.slopes(np.repeat(sigma, times.shape[1]), times.ravel())[:, 14].reshape(times.shape)
+    along = strip.slopes(sigma, np.zeros(len(sigma)))[:, :3]
     b = np.cross(strip.first_normals(sigma), strip.rays.directions[:, 0])
     return np.asarray(slopes / np.sum(along * b, axis=1)[:, None])
 

@@ -18,7 +18,7 @@ from enum import IntEnum
 import numpy as np
 from numba import njit
 
-from creeping.geodesics.kernels.attenuation import SAMPLES, extend
+from creeping.geodesics.kernels.attenuation import extend
 from creeping.geodesics.kernels.flow_derivative import project_block
 from creeping.kernels.block import BLOCK, aligned, entry_options, options, strict_inlined, strict_options
 from creeping.kernels.splines import cells_and_fractions, stencil_sum, weights
@@ -48,7 +48,7 @@ def workspace():
     Of d, rows of four, are the displacements, matrices, curvatures (of 2 x 4) and packed lanes that are interpolated.
     """
     r, m, work, uva, w = aligned(4, BLOCK), aligned(6, BLOCK), aligned(9, BLOCK), aligned(3, BLOCK), aligned(18, BLOCK)
-    d, a, sampled = np.zeros((6 * BLOCK, 4)), aligned(2, BLOCK), aligned(SAMPLES, BLOCK)
+    d, a, sampled = np.zeros((6 * BLOCK, 4)), aligned(2, BLOCK), aligned(23, BLOCK)
     return (
         r,
         m,
@@ -190,8 +190,8 @@ def flow(kind, leap, time, rules, degree, scale, shift, rays, counts, budget, re
     Rays are coordinates r (4,), Jacobi matrix (4,), attenuation and time of detachment; they are used up. Of each
     output coordinates stand at [:4], the rest from 6 on.
 
-    ``leap`` is (table, centre, jacobi, matrix, curvature, flagged), as of `phaseflow.grid.Leap`: table (charts, nu, nv,
-    na, 4) holds the displacement less its mean ``centre``, jacobi (..., 4 or 8) the Jacobi matrix less its mean
+    ``leap`` is (table, centre, jacobi, matrix, curvature, flagged), as of `phaseflow.splines.Leap`: table (charts, nu,
+    nv, na, 4) holds the displacement less its mean ``centre``, jacobi (..., 4 or 8) the Jacobi matrix less its mean
     ``matrix``, or all three, curvature (..., 8) that of `geodesics.kernels.attenuation`, as are the ``rules``.
 
     Returns whether all is done. After ``budget`` leaps of a block it is not, and is to be called again with the same
