@@ -13,8 +13,7 @@ import numpy as np
 
 from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import IntegrationError, InvalidInputError
-from creeping.geodesics.bundle import bundle_states
-from creeping.geodesics.states import unpack
+from creeping.geodesics.states import bundle_states, unpack
 from creeping.geodesics.tableaus import DORMAND_PRINCE_8, Method, dense_weights
 from creeping.geometry.arguments import checked_body, number_between, real_array
 from creeping.geometry.evaluators import evaluators

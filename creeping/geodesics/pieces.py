@@ -25,9 +25,8 @@ import numpy as np
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import IntegrationError
 from creeping.geodesics.attenuation import trace_own, with_attenuation
-from creeping.geodesics.bundle import project_bundle
 from creeping.geodesics.integrator import trace_states
-from creeping.geodesics.states import BARE, DETACHMENT, WHOLE, P, X
+from creeping.geodesics.states import BARE, DETACHMENT, WHOLE, P, X, project_bundle
 from creeping.geometry.piecewise import (
     SMOOTH,
     is_piecewise,

@@ -15,10 +15,9 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.errors import ToleranceError
 from creeping.geodesics.attenuation import NODES, chebyshev_times, curvature_values
-from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.integrator import ErrorEstimate, trace_states
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import pack, random_bundle_points
 from creeping.geodesics.tableaus import RUNGE_KUTTA_4
 from creeping.geometry.checks import check_surface
 from creeping.geometry.surface import Surface, fingerprint

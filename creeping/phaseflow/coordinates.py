@@ -24,7 +24,6 @@ Sources: [YC06b]; Derivations, B2, R15 and R18.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -189,10 +188,6 @@ class MeridianModel(RotationModel):
         axis = charted_axis(body)
         assert axis is not None
         self.axis = axis
-
-    @cached_property
-    def _surface_table(self) -> FloatArray:
-        return RotationModel(self.body)._surface_table
 
     def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
         """See `CompiledModel`; the axis follows the shift."""

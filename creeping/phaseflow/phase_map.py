@@ -18,14 +18,16 @@ from creeping._typing import Any, ArrayLike, FloatArray, IntArray
 from creeping._version import __version__
 from creeping.errors import InvalidInputError
 from creeping.geodesics.attenuation import with_attenuation
-from creeping.geodesics.bundle import bundle_states
 from creeping.geodesics.integrator import ErrorEstimate, as_times, trace_states
-from creeping.geodesics.states import DETACHMENT, checked_states, unpack
+from creeping.geodesics.states import DETACHMENT, bundle_states, checked_states, unpack
 from creeping.geometry.arguments import folder_path, positive_number, real_number, whole_number
 from creeping.geometry.surface import Surface, fingerprint
 from creeping.phaseflow.coordinates import Model
 from creeping.phaseflow.splines import Grid, Leap
 from creeping.storage.folder import write_folder
+
+TABLES = "state", "jacobi", "curvature", "flagged"
+"""Tables of a leap that are stored as files."""
 
 
 @dataclass(frozen=True)
@@ -336,8 +338,7 @@ class PhaseMap(Drawn):
             "growth": self.growth and [self.growth.lengths, self.growth.rms, self.growth.max, [self.growth.bound]],
             "parameters": self.parameters,
         }
-        states = {f"state-{k}.npy": leap.state for k, leap in enumerate(self.leaps)}
-        jacobis = {f"jacobi-{k}.npy": leap.jacobi for k, leap in enumerate(self.leaps)}
-        curvatures = {f"curvature-{k}.npy": leap.curvature for k, leap in enumerate(self.leaps)}
-        flagged = {f"flagged-{k}.npy": leap.flagged for k, leap in enumerate(self.leaps)}
-        return write_folder(folder, content, states | jacobis | curvatures | flagged)
+        leaps = enumerate(self.leaps)
+        return write_folder(
+            folder, content, {f"{name}-{k}.npy": getattr(leap, name) for k, leap in leaps for name in TABLES}
+        )

@@ -15,11 +15,10 @@ import numpy as np
 
 from creeping._typing import FloatArray
 from creeping.errors import IntegrationError, ToleranceError
-from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.integrator import ErrorEstimate, trace_states
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import pack, random_bundle_points
 from creeping.geometry.arguments import checked_body, folder_path, number_between, positive_number, reporter
 from creeping.geometry.piecewise import checked_smooth, is_piecewise
 from creeping.geometry.surface import Surface, size
@@ -33,7 +32,7 @@ from creeping.phaseflow.building import (
     upper_bound,
     with_errors,
 )
-from creeping.phaseflow.cache import cached_phase_map, is_cached
+from creeping.phaseflow.cache import cached_phase_map, cached_place
 from creeping.phaseflow.coordinates import model_of
 from creeping.phaseflow.map_spec import RAYS, MapSpec
 from creeping.phaseflow.phase_map import PhaseMap
@@ -263,7 +262,7 @@ def _stored(spec: MapSpec, tolerance: float, cache: bool | str | Path) -> MapSpe
     if tolerance < 1e-9:
         return None
     for one in (spec, replace(spec, n_rays=RAYS)):
-        if is_cached(one.body, one.key(), folder=cache):
+        if cached_place(one.body, one.key(), cache).exists():
             return one
     return None
 

@@ -123,8 +123,7 @@ class CompiledModel:
     def flow(self, grid: Grid, leap: Leap, states: FloatArray, counts: IntArray) -> FloatArray:
         """Compose counts[0], then counts[1], ... maps on states (n, 6, 10 or 12): (n, m, the same)."""
         from creeping.kernels.block import aligned
-        from creeping.phaseflow.kernels.composition import flow
-        from creeping.phaseflow.kernels.nodes import flow_ordered
+        from creeping.phaseflow.kernels.composition import flow, flow_ordered
 
         out = np.empty((len(states), len(counts), states.shape[1]))
         states = np.ascontiguousarray(states, dtype=float)
@@ -156,7 +155,7 @@ class CompiledModel:
 
         The last two are empty if the leap does not carry them.
         """
-        from creeping.phaseflow.kernels.nodes import double
+        from creeping.phaseflow.kernels.composition import double
 
         out = np.empty((len(nodes), 4))
         matrices = np.empty((len(nodes) if leap.has_jacobi else 0, 4))
@@ -182,7 +181,7 @@ class RotationModel(CompiledModel):
     @cached_property
     def _surface_table(self) -> FloatArray:
         """Table of x(u, v) for the kernels, none if psi itself is to be used."""
-        return exit_table(self.body, self)
+        return exit_table(self.body)
 
     def _to_model(self, states: FloatArray, rays: FloatArray) -> None:
         from creeping.phaseflow.kernels import rotation, surface_table
@@ -239,10 +238,6 @@ class OctantModel(RotationModel):
     kind = 2
     charts = 3
 
-    @cached_property
-    def _surface_table(self) -> FloatArray:
-        return RotationModel(self.body)._surface_table
-
     def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
         """See `CompiledModel`."""
         return grid.cells, np.array([*grid.origin, 0.0])
@@ -292,12 +287,12 @@ def _tables(leap: Leap) -> tuple[Any, ...]:
     return leap.state, leap.centre, leap.jacobi, leap.matrix, leap.curvature, leap.flagged
 
 
-def exit_table(body: Surface, model: "RotationModel") -> FloatArray:
+def exit_table(body: Surface) -> FloatArray:
     """Coefficients (6, n, n, 4) of x(u, v) on the charts where psi is an iteration, none (0, 1, 1, 4) elsewhere.
 
     The coarsest table with an rms error of (x, p) below 1e-9, x in body sizes.
     """
-    found = np.zeros((0, 1, 1, 4))
+    found, model = np.zeros((0, 1, 1, 4)), RotationModel(body)
     model._surface_table = found
     if not getattr(getattr(body.atlas, "sphere_map", None), "iterative", False):
         return found

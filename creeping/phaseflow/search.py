@@ -29,11 +29,10 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.errors import ToleranceError
 from creeping.geodesics.attenuation import NODES, fine_spacing
-from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.integrator import trace_states
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import pack, random_bundle_points
 from creeping.geometry.evaluators import speed_of
 from creeping.geometry.surface import Surface, size
 from creeping.kernels.threads import BLOCK
@@ -119,7 +118,9 @@ def tuned_map(spec: MapSpec, progress: Progress, found: list[Candidate] | None =
                 plan, before = replace(plan, single=False), np.inf
             else:
                 full = model.charts * int(np.prod(plan.grid.nodes)) > 0.9 * MAX_NODES
-                plan, before = _finer(plan, reached / (SAFE * tolerance)), reached
+                # every axis, so that its error falls by the excess, at least by a tenth of its cells
+                excess = (reached / (SAFE * tolerance)) ** (1 / (plan.grid.degree + 1))
+                plan, before = _scaled(plan, float(np.clip(1.02 * excess, 1.06, 2.0))), reached
                 most = MAX_NODES / (model.charts * int(np.prod(plan.grid.nodes)))
                 if full:
                     break
@@ -154,7 +155,8 @@ def _measured(built: PhaseMap, spec: MapSpec, cost: float, known: dict[Any, Refe
     expensive = 4 * cost * length * samples > budget
     rtol = 1e-3 * spec.tolerance if expensive else 1e-12
     result = with_errors(built, spec.length, samples=samples, rtol=rtol, most=1 if expensive else 16, known=known)
-    return result, measuring_seconds(cost, length, result.error.samples, rtol)
+    # steps of order 8 shorten like rtol^(1/8)
+    return result, cost * length * result.error.samples * float((1e-9 / rtol) ** (1 / 8))
 
 
 def _budget(spec: MapSpec, cost: float) -> float:
@@ -325,11 +327,6 @@ def _grid(cells: list[float], degree: int, periodic: tuple[bool, ...], least: in
     )
 
 
-def _finer(plan: Plan, excess: float) -> Plan:
-    """The plan with every axis refined so that its error falls by the excess, at least by a tenth of its cells."""
-    return _scaled(plan, float(np.clip(1.02 * excess ** (1 / (plan.grid.degree + 1)), 1.06, 2.0)))
-
-
 def _scaled(plan: Plan, factor: float) -> Plan:
     grid = plan.grid
     cells = [factor * c for c in grid.cells]
@@ -427,8 +424,3 @@ def doublings_of(horizon: float, natural: float, cost: float) -> int:
     while cost * horizon / 2 ** (d + 1) > DOUBLING and horizon / 2 ** (d + 1) >= natural / 8:
         d += 1
     return d
-
-
-def measuring_seconds(cost: float, length: float, samples: int, rtol: float) -> float:
-    """Nominal seconds of rays that are traced as a reference: steps of order 8 shorten like rtol^(1/8)."""
-    return cost * length * samples * float((1e-9 / rtol) ** (1 / 8))

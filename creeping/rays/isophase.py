@@ -140,7 +140,6 @@ def iso_phase_curves(
     beyond_detachment = flag(beyond_detachment, "beyond_detachment")
     if not len(fan.points):
         return []
-    hermite = _Hermite(fan)
     offset = fan.eikonal[:, 0] - fan.travel_time[0] if of == "eikonal" else np.zeros(len(fan.points))
     last = _whole_steps(fan)
     if not beyond_detachment:
@@ -153,7 +152,8 @@ def iso_phase_curves(
     if not pieces:
         return []
     # all points in one call: a level has few
-    points = hermite.at(np.concatenate([run for _, run, _, _ in pieces]), np.concatenate([t for _, _, t, _ in pieces]))
+    rays, times = (np.concatenate([piece[k] for piece in pieces]) for k in (1, 2))
+    points = _points_at(fan, rays, times)
     parameters = fan.body.parameters(points)
     ends = np.cumsum([len(run) for _, run, _, _ in pieces])[:-1]
     parts = zip(pieces, np.split(points, ends), np.split(parameters, ends), strict=True)
@@ -194,34 +194,25 @@ def _runs(fan: RayFan, met: IntArray) -> Iterable[tuple[IntArray, bool]]:
                 yield group, False
 
 
-class _Hermite:
-    """Quintic interpolation of the rays in time."""
-
-    def __init__(self, fan: RayFan) -> None:
-        self.fan = fan
-        c = speed_values(fan.body, fan.points)[..., None]
-        velocity, turning = vector_field(fan.body, fan.points, fan.directions)
-        self.velocity = velocity
-        self.acceleration = c * turning
-        speed = speed_of(fan.body)
-        if speed is not None:
-            # x'' = (c p)' with c' = grad c.x'
-            self.acceleration += np.sum(speed.gradient(fan.points) * velocity, axis=-1, keepdims=True) * fan.directions
-
-    def at(self, rays: IntArray, times: FloatArray) -> FloatArray:
-        """Points of the rays at one time each: (n,), (n,) -> (n, 3)."""
-        steps = self.fan.travel_time
-        k = np.clip(np.searchsorted(steps, times, side="right") - 1, 0, len(steps) - 2)
-        h = (steps[k + 1] - steps[k])[:, None]
-        s = (times - steps[k])[:, None] / h
-        cube = s**3
-        end = cube * (10 - 15 * s + 6 * s**2)
-        points = (1 - end) * self.fan.points[rays, k] + end * self.fan.points[rays, k + 1]
-        points += h * (s - cube * (6 - 8 * s + 3 * s**2)) * self.velocity[rays, k]
-        points += h * cube * (-4 + 7 * s - 3 * s**2) * self.velocity[rays, k + 1]
-        points += h**2 * 0.5 * (s**2 - cube * (3 - 3 * s + s**2)) * self.acceleration[rays, k]
-        points += h**2 * 0.5 * cube * (1 - 2 * s + s**2) * self.acceleration[rays, k + 1]
-        return project(self.fan.body, points)
+def _points_at(fan: RayFan, rays: IntArray, times: FloatArray) -> FloatArray:
+    """Points of the rays at one time each, by quintics between steps: (n,), (n,) -> (n, 3)."""
+    velocity, turning = vector_field(fan.body, fan.points, fan.directions)
+    acceleration, speed = speed_values(fan.body, fan.points)[..., None] * turning, speed_of(fan.body)
+    if speed is not None:
+        # x'' = (c p)' with c' = grad c.x'
+        acceleration += np.sum(speed.gradient(fan.points) * velocity, axis=-1, keepdims=True) * fan.directions
+    steps = fan.travel_time
+    k = np.clip(np.searchsorted(steps, times, side="right") - 1, 0, len(steps) - 2)
+    h = (steps[k + 1] - steps[k])[:, None]
+    s = (times - steps[k])[:, None] / h
+    cube = s**3
+    end = cube * (10 - 15 * s + 6 * s**2)
+    points = (1 - end) * fan.points[rays, k] + end * fan.points[rays, k + 1]
+    points += h * (s - cube * (6 - 8 * s + 3 * s**2)) * velocity[rays, k]
+    points += h * cube * (-4 + 7 * s - 3 * s**2) * velocity[rays, k + 1]
+    points += h**2 * 0.5 * (s**2 - cube * (3 - 3 * s + s**2)) * acceleration[rays, k]
+    points += h**2 * 0.5 * cube * (1 - 2 * s + s**2) * acceleration[rays, k + 1]
+    return project(fan.body, points)
 
 
 def split_at_seam(parameters: FloatArray, *, closed: bool) -> list[FloatArray]:

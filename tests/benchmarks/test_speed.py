@@ -9,9 +9,8 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.integrator import trace_states
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import pack, random_bundle_points
 from creeping.phaseflow.request import tuned_direct
 
 pytestmark = pytest.mark.slow

@@ -7,10 +7,9 @@ from scipy.integrate import solve_ivp
 from tolerances import JACOBI_DIFFERENCE, TRACE
 
 import creeping as cr
-from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.equations import vector_field
 from creeping.geodesics.integrator import trace_states
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import pack, random_bundle_points
 from creeping.geodesics.tableaus import RUNGE_KUTTA_4
 from creeping.geometry.evaluators import speed_values
 from creeping.geometry.surface import normal

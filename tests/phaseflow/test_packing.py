@@ -9,8 +9,7 @@ from scipy.special import betainc
 
 import creeping as cr
 import scatterers as sc
-from creeping.geodesics.bundle import random_bundle_points
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import pack, random_bundle_points
 from creeping.phaseflow.rotation import bent_floor
 
 

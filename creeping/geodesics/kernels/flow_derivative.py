@@ -10,7 +10,7 @@ Arrays of a block are component by component, each of BLOCK numbers. Evaluators 
 views that are made once, and what takes their results from there on takes addresses: making a view, or telling a
 function of an array, takes as long as the arithmetic.
 
-Also here: compiled twin of `bundle.bundle_points`: points and directions of a caller are checked and put onto T1Q.
+Also here: compiled twin of `states.bundle_states`: points and directions of a caller are checked and put onto T1Q.
 
 Sources: Derivations, R1, R3 and R13.
 """
