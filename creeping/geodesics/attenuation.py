@@ -22,7 +22,6 @@ times not too close to each other. H_jd depends on the times only, not on the ra
 Sources: Derivations, R3, R13 and R14.
 """
 
-from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -162,7 +161,6 @@ def with_attenuation(
     *,
     rtol: float,
     step: float | None = None,
-    transport: Callable[[FloatArray, FloatArray], FloatArray] | None = None,
     limit: int = 100_000,
 ) -> FloatArray:
     """Advance states (n, 12) to the ascending times (m,) by one trace: (n, m, 12).
@@ -175,15 +173,11 @@ def with_attenuation(
         Relative tolerance per step, which sets the spacing of the fine times as well.
     step : float, optional
         Longest of equal steps, taken instead of adapted ones.
-    transport : callable, optional
-        Gives the first ten lanes of the result instead of the trace.
     limit : int
         Most steps between fine times, as for `trace_states`.
     """
     times = np.asarray(times, dtype=float)
     out = np.empty((len(states), len(times), 12))
-    if transport is not None:
-        out[..., :10] = transport(states[:, :10], times)
     spacing = fine_spacing(body, rtol, step)
     # differences of times next to the smallest number would underflow
     ends = np.unique(times[times > 1e-100 * spacing])
@@ -192,14 +186,13 @@ def with_attenuation(
         return out
     fine = sliding(ends, spacing, fine_rules()[0])
     place = np.searchsorted(fine.times, np.where(times >= ends[0], times, 0.0))
-    lanes = 10 if transport is None else 6
     adapted = rtol if step is None else 0.0
-    rays = max(1, WORKSPACE // (lanes * len(fine.times) * BLOCK)) * BLOCK
+    rays = max(1, WORKSPACE // (10 * len(fine.times) * BLOCK)) * BLOCK
     for start in range(0, len(states), rays):
         part = slice(start, start + rays)
         out[part, 0, 10:] = states[part, 10:]
         # the traced states bear no name here, or two slices would be in memory at once
-        _along(body, _traced(body, states[:, :lanes], part, fine.times, adapted, step, limit), fine, place, out[part])
+        _along(body, _traced(body, states[:, :10], part, fine.times, adapted, step, limit), fine, place, out[part])
     return out
 
 
@@ -222,8 +215,8 @@ def _along(body: Surface, states: FloatArray, fine: Sliding, place: IntArray, ou
     Parameters
     ----------
     body : Surface
-    states : (n, times, 6 or 10)
-        At the fine times; ten components are copied to ``out``.
+    states : (n, times, 10)
+        At the fine times; they are copied to ``out``.
     fine : Sliding
         Their intervals, with the Gauss points of `fine_rules`.
     place : (m,)
@@ -233,8 +226,7 @@ def _along(body: Surface, states: FloatArray, fine: Sliding, place: IntArray, ou
     """
     from creeping.geodesics.kernels.attenuation import extend_along as kernel
 
-    if states.shape[2] > 6:
-        out[..., : states.shape[2]] = states[:, place]
+    out[..., :10] = states[:, place]
 
     def run(part: slice) -> None:
         kernel(_bent(body, states[part, :, :6], fine), fine.times, (*fine_rules(), DIP), place, out[part])

@@ -190,7 +190,9 @@ def on_body(body: Surface, points: FloatArray) -> FloatArray:
     InvalidInputError
         On a point farther off.
     """
-    distance = distance_to_body(body, points)
+    # to the first order
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = np.abs(body.level(points)) / np.linalg.norm(body.gradient(points), axis=-1)
     off = ~(distance <= OFF_BODY * size(body))
     if off.any():
         worst = float(np.nanmax(np.where(off, distance, 0.0)))
@@ -200,13 +202,6 @@ def on_body(body: Surface, points: FloatArray) -> FloatArray:
             worst=worst,
         )
     return project(body, points)
-
-
-def distance_to_body(body: Surface, points: FloatArray) -> FloatArray:
-    """First-order distance |F|/|grad F|, L: (..., 3) -> (...)."""
-    slope = np.linalg.norm(body.gradient(points), axis=-1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.abs(body.level(points)) / slope)
 
 
 def random_bundle_points(body: Surface, count: int, *, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:

@@ -50,7 +50,7 @@ class Plan:
     reach : float
         Longest horizon over which curvatures are carried, in natural ones; see `curvature_reach`.
     tolerance : float
-        Of the attenuation over a leap; see `packing`.
+        Of the attenuation over a leap; see `rotation`.
     """
 
     horizon: float

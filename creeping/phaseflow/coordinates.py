@@ -104,29 +104,26 @@ class AmbientModel:
 
     def flow(self, grid: Grid, leap: Leap, states: FloatArray, counts: IntArray) -> FloatArray:
         """Compose counts[0], then counts[1], ... maps on states (n, 6 or 10): (n, m, the same)."""
-        current = np.array(states, dtype=float, order="C")
-        out = np.empty((len(states), len(counts), states.shape[1]))
-        for k, count in enumerate(counts):
-            self._compose(grid, leap, current, int(count))
-            out[:, k] = current
-        return out
-
-    def _compose(self, grid: Grid, leap: Leap, states: FloatArray, count: int) -> None:
         from creeping.phaseflow.kernels.composition import leap_in_space
 
+        current = np.array(states, dtype=float, order="C")
+        out = np.empty((len(states), len(counts), states.shape[1]))
         # so near a composed ray counts as on the body
         off = 1e-13 * size(self.body)
         tables = leap.state, leap.jacobi, grid.degree, grid.origin, grid.cells
         with evaluators(self.body) as parts, locator(self.body) as place:
+            for k, count in enumerate(counts.tolist()):
 
-            def run(part: slice) -> None:
-                # a map composed with itself in place may be left in between, every 0.1 s for a block
-                for done in range(0, count, 1000):
-                    some = min(1000, count - done)
-                    leap_in_space(*place, *parts[:2], *tables, leap.time, some, off, states[part])
-                    pause()
+                def run(part: slice, count: int = count) -> None:
+                    # a map composed with itself in place may be left in between, every 0.1 s for a block
+                    for done in range(0, count, 1000):
+                        some = min(1000, count - done)
+                        leap_in_space(*place, *parts[:2], *tables, leap.time, some, off, current[part])
+                        pause()
 
-            in_threads(run, len(states))
+                in_threads(run, len(current))
+                out[:, k] = current
+        return out
 
 
 Model = AmbientModel | CompiledModel

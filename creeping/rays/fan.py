@@ -165,7 +165,14 @@ class RayFan(DrawnOnBody):
 
     def losses(self, wavenumber: float | None = None) -> Losses:
         """Shares of shadow line, rays and outline lost to edges and tips; ``wavenumber`` is that of `launch`."""
-        return Losses(self.line.edge_share, _of_rays(self, wavenumber), outline_share(self.line))
+        launched, lost = self.launched, 0.0
+        ended = launched & np.isin(self.status, AT_CREASES)
+        if np.any(ended):
+            k = IN_RANGE * float(np.median(self.curvature[launched, 0])) if wavenumber is None else wavenumber
+            # a ray that has ended stays where it is, and so does its attenuation
+            left = np.exp(-np.cbrt(max(k, 0.0) / 2) * self.attenuation[ended, -1] * HARD_DECAY)
+            lost = float(np.sum(self.spacing[ended] * left) / np.sum(self.spacing[launched]))
+        return Losses(self.line.edge_share, lost, outline_share(self.line))
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{count} {name}" for name, count in self.status_counts.items())
@@ -392,14 +399,3 @@ def end_error(fan: RayFan) -> ErrorEstimate:
     exact = trace(fan.body, first, np.array([fan.length]), rtol=rtol)[:, 0]
     error = np.linalg.norm(np.concatenate([fan.points[chosen, -1], fan.directions[chosen, -1]], axis=1) - exact, axis=1)
     return ErrorEstimate(float(np.sqrt(np.mean(error**2))), float(error.max()), len(chosen))
-
-
-def _of_rays(fan: RayFan, wavenumber: float | None) -> float:
-    launched = fan.launched
-    ended = launched & np.isin(fan.status, AT_CREASES)
-    if not np.any(ended):
-        return 0.0
-    k = IN_RANGE * float(np.median(fan.curvature[launched, 0])) if wavenumber is None else wavenumber
-    # a ray that has ended stays where it is, and so does its attenuation
-    left = np.exp(-np.cbrt(max(k, 0.0) / 2) * fan.attenuation[ended, -1] * HARD_DECAY)
-    return float(np.sum(fan.spacing[ended] * left) / np.sum(fan.spacing[launched]))

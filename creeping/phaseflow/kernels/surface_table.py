@@ -1,6 +1,6 @@
 """Compiled conversion of (x, p) to and from rotations by a table of x(u, v) instead of psi.
 
-See `rotation` and `surface_spline`.
+See `rotation`.
 
 With T = [x_u, x_v] and G = T^T T, and the stereographic charts being conformal,
 
