@@ -59,13 +59,13 @@ from .geometry.incident import PointSource as PointSource
 from .phaseflow.cache import load_phase_map as load_phase_map
 from .phaseflow.phase_map import ErrorGrowth as ErrorGrowth
 from .phaseflow.phase_map import PhaseMap as PhaseMap
-from .phaseflow.tuning.request import build_phase_map as build_phase_map
-from .phaseflow.tuning.request import choose_flow as choose_flow
+from .phaseflow.request import build_phase_map as build_phase_map
+from .phaseflow.request import choose_flow as choose_flow
+from .rays.ends import RayStatus as RayStatus
 from .rays.fan import RayFan as RayFan
 from .rays.fan import launch as launch
 from .rays.isophase import IsoPhaseCurve as IsoPhaseCurve
 from .rays.isophase import iso_phase_curves as iso_phase_curves
-from .rays.status import RayStatus as RayStatus
 from .rays.uncertain_body import BodyUncertainty as BodyUncertainty
 from .rays.uncertain_body import body_uncertainty as body_uncertainty
 from .shadow.line import ShadowLine as ShadowLine

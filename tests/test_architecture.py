@@ -48,7 +48,6 @@ AT_ROOT = (*FOLDERS, "pyproject.toml", "README.md", "LICENSE", "CHANGELOG.md", "
 
 # modules outside `kernels` folders whose constants (names in capitals) kernels share; types and errors are not compiled
 SHARED_CONSTANTS = (
-    "creeping.geodesics.hermite",
     "creeping.geodesics.tableaus",
     "creeping.rays.quantities",
     "creeping.shadow.status",
@@ -127,7 +126,7 @@ def test_kernels_that_python_calls_are_not_inlined():
         and "strict_options as options" not in texts()[file]
     }
     # the integrators would compile no sooner, and are slower by some per cent
-    integrators = {file for file in kernels() if Path(file).stem in ("integrator", "own_times")}
+    integrators = {file for file in kernels() if Path(file).stem == "integrator"}
     assert not {(file, name) for file, name in called & inlined if file not in integrators}
 
 

@@ -22,8 +22,8 @@ from creeping.field.equation.solution import Solution
 from creeping.field.validity_range import Validity, validity_words
 from creeping.geometry.arguments import rays_refused
 from creeping.geometry.piecewise import is_piecewise
+from creeping.rays.ends import RayStatus
 from creeping.rays.fan import RayFan
-from creeping.rays.status import RayStatus
 from creeping.rays.uncertain_body import body_uncertainty
 
 PLANES = {"incidence": None, "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}

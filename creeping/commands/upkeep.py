@@ -97,7 +97,7 @@ def list_maps(*, json_: options.Json = False) -> int:
 def verify_maps() -> int:
     """Check every stored map and fitted body against its digests; exit code 3 if one is damaged."""
     from creeping.errors import CreepingError
-    from creeping.kernels.private_cache import require_private
+    from creeping.kernels.cache import require_private
     from creeping.storage import folder as storing
     from scatterers.fits import cache as _fit_cache
 

@@ -29,8 +29,8 @@ from creeping.field.results.point_result import FieldStatus, PointValues, Words
 from creeping.field.waves.ray_sums import RaySum
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import size
+from creeping.rays.ends import RayStatus
 from creeping.rays.fan import RayFan
-from creeping.rays.status import RayStatus
 
 
 class LitFactors(NamedTuple):

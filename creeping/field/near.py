@@ -64,7 +64,7 @@ from creeping.field.routes import (
 from creeping.field.waves.far_geometry import fan_strips
 from creeping.field.waves.near_wave import height_above, shed_waves
 from creeping.field.waves.ray_sums import RaySum, own_error, ray_sum
-from creeping.geodesics.bundle import as_points
+from creeping.geodesics.states import as_points
 from creeping.geometry.surface import normal, size
 from creeping.rays.fan import RayFan
 from creeping.rays.shedding import ShedRays, free_ways, shed_near

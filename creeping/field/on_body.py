@@ -54,7 +54,7 @@ from creeping.field.waves.beams import wide
 from creeping.field.waves.far_geometry import fan_strips
 from creeping.field.waves.ray_sums import RaySum, own_error, ray_sum, total_of
 from creeping.field.waves.surface import surface_waves
-from creeping.geodesics.bundle import as_points, on_body
+from creeping.geodesics.states import as_points, on_body
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.quadrature import nodes_at
 from creeping.geometry.surface import Surface, normal, project, size

@@ -29,7 +29,7 @@ from creeping.field.near import MISSING, near_field
 from creeping.field.results.labelled import ArrayResult, Tabled, dataset, directed
 from creeping.field.results.point_result import FieldStatus, NearField, WithStatus
 from creeping.field.waves.surface import scalar_boundary
-from creeping.geodesics.bundle import as_points
+from creeping.geodesics.states import as_points
 from creeping.geometry.checks import unit_of
 from creeping.geometry.surface import Surface
 from creeping.rays.fan import launch

@@ -22,9 +22,9 @@ from creeping.files.tables import angles_of, joined, number_of
 from creeping.geometry.checks import UNKNOWN, unit_of
 from creeping.geometry.evaluators import speed_of
 from creeping.geometry.incident import PointSource
+from creeping.rays.ends import ENDED, RayStatus
 from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
-from creeping.rays.status import ENDED, RayStatus
 from creeping.shadow.line import ShadowLine
 from creeping.shadow.status import STATUSES
 from creeping.storage.atomic import written_aside

@@ -4,36 +4,41 @@
 
 kappa_n is smooth, its power is not. Over one leap of a map g = c^(3/2) kappa_n is known at NODES Chebyshev times, and
 the power is taken of the polynomial through them, at Gauss times. Of a traced ray g is known at the Gauss times
-themselves, from the polynomial of the ray (`hermite`), and at both ends of an interval: these are the nodes there. In
-the interval that ends at a zero t1, t = t1 (1 - s^3) makes g^(2/3) dt smooth again, since g goes like t1 - t.
+themselves and at both ends of an interval: these are the nodes there. In the interval that ends at a zero t1,
+t = t1 (1 - s^3) makes g^(2/3) dt smooth again, since g goes like t1 - t.
 
-Sources: Derivations, R13.
+Between two of the fine times to which it is traced, the ray is the polynomial of degree 11 that agrees with x, x' and
+x'' at the four knots t_j around,
+
+    x(t) = sum_j sum_d H_jd(t) x^(d)(t_j),    H_jd(t) = tau^d/d! l_j(t)^3 sum_(i <= 2-d) c_ji tau^i,    tau = t - t_j,
+
+l_j the Lagrange polynomials and c_ji the Taylor coefficients of l_j^-3 at t_j:
+
+    c_j0 = 1,  c_j1 = -3 s_1,  c_j2 = (9 s_1^2 + 3 s_2)/2,    s_m = sum_(k != j) (t_j - t_k)^-m.
+
+Fine times are 0, the outputs and, where these lie further apart than a spacing, times between them; knots are fine
+times not too close to each other. H_jd depends on the times only, not on the ray.
+
+Sources: Derivations, R3, R13 and R14.
 """
 
-from collections.abc import Callable
 from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from creeping._typing import FloatArray, IntArray
 from creeping.errors import IntegrationError
 from creeping.geodesics.equations import natural_horizon, vector_field
-from creeping.geodesics.hermite import NEAREST, Sliding, sliding
-from creeping.geodesics.integrator import MAX_STEPS, trace_states
+from creeping.geodesics.integrator import trace_each, trace_states
+from creeping.geodesics.states import ATTENUATION, DETACHMENT, WHOLE
 from creeping.geometry.evaluators import evaluators, speed_of
 from creeping.geometry.surface import Surface
-from creeping.kernels.threads import CHUNK, in_slices, in_threads
+from creeping.kernels.threads import BLOCK, in_slices, in_threads
 
 NODES = 8
-GAUSS = 12
-SEARCH = 32
-"""Intervals of a leap in which the first zero is looked for."""
-FINE_GAUSS, FINE_SEARCH = NODES - 2, 16
-"""Gauss points of an interval of a traced ray, and parts of it in which the first zero is looked for."""
-DIP, REFINED = 0.2, 3
-"""Least over greatest curvature of an interval below which each of its parts is integrated, at so many Gauss points."""
-TOGETHER = 512
-"""Most rays at a time: what lies between their knots takes some 20 MB then."""
+DIP = 0.2
+"""Least over greatest curvature of an interval below which each of its parts is integrated."""
 WORKSPACE = 2**24
 """Numbers that the states at fine times may take."""
 
@@ -45,7 +50,7 @@ def chebyshev_times() -> FloatArray:
 
 
 @cache
-def gauss_rule(count: int = GAUSS) -> tuple[FloatArray, FloatArray]:
+def gauss_rule(count: int = 12) -> tuple[FloatArray, FloatArray]:
     """Gauss points and weights of the unit interval: (count,), (count,)."""
     points, weights = np.polynomial.legendre.leggauss(count)
     return 0.5 * (points + 1), 0.5 * weights
@@ -63,18 +68,6 @@ def lagrange(at: FloatArray, nodes: FloatArray | None = None) -> FloatArray:
 
 
 @cache
-def sampling() -> FloatArray:
-    """From values at the Chebyshev points to those at the Gauss points and both ends: (GAUSS + 2, NODES)."""
-    return lagrange(np.concatenate([gauss_rule()[0], [0.0, 1.0]]))
-
-
-@cache
-def searching() -> FloatArray:
-    """From values at the Chebyshev points to equally spaced ones: (SEARCH + 1, NODES)."""
-    return lagrange(np.linspace(0, 1, SEARCH + 1))
-
-
-@cache
 def halves() -> FloatArray:
     """From values at the Chebyshev points of two halves to those of the whole: (NODES, 2 NODES)."""
     times = chebyshev_times()
@@ -87,8 +80,13 @@ def halves() -> FloatArray:
 
 @cache
 def kernel_rules() -> tuple[FloatArray, ...]:
-    """What the kernels need to know of all this: see `geodesics.kernels.attenuation.extend`."""
-    return (sampling(), searching(), *gauss_rule(), chebyshev_times())
+    """What the kernels need to know of all this: see `geodesics.kernels.attenuation.extend`.
+
+    Matrices from values at the Chebyshev points to those at the Gauss points and both ends, (14, NODES), and to equally
+    spaced ones, between which the first zero is looked for, (33, NODES); Gauss points and weights; Chebyshev points.
+    """
+    sampling = lagrange(np.concatenate([gauss_rule()[0], [0.0, 1.0]]))
+    return sampling, lagrange(np.linspace(0, 1, 33)), *gauss_rule(), chebyshev_times()
 
 
 @cache
@@ -97,21 +95,41 @@ def fine_rules() -> tuple[FloatArray, ...]:
 
     Returns
     -------
-    points, weights : (FINE_GAUSS,)
+    points, weights : (6,)
         Of Gauss.
     nodes : (NODES,)
-    searching : (FINE_SEARCH + 1, NODES)
-        From values at the nodes to equally spaced ones.
-    refined, refined_weights : (FINE_SEARCH REFINED, NODES), (FINE_SEARCH REFINED,)
-        To the Gauss points of each part, and their weights.
+    searching : (17, NODES)
+        From values at the nodes to equally spaced ones, the ends of 16 parts.
+    refined, refined_weights : (48, NODES), (48,)
+        To three Gauss points of each part, and their weights.
     """
-    points, weights = gauss_rule(FINE_GAUSS)
+    points, weights = gauss_rule(NODES - 2)
     nodes = np.concatenate([[0.0], points, [1.0]])
-    inside, part_weights = gauss_rule(REFINED)
-    parts = np.arange(FINE_SEARCH)[:, None]
-    refined = lagrange(((parts + inside) / FINE_SEARCH).ravel(), nodes)
-    searching = lagrange(np.linspace(0, 1, FINE_SEARCH + 1), nodes)
-    return points, weights, nodes, searching, refined, np.tile(part_weights / FINE_SEARCH, FINE_SEARCH)
+    inside, part_weights = gauss_rule(3)
+    refined = lagrange(((np.arange(16)[:, None] + inside) / 16).ravel(), nodes)
+    return points, weights, nodes, lagrange(np.linspace(0, 1, 17), nodes), refined, np.tile(part_weights / 16, 16)
+
+
+class Sliding(NamedTuple):
+    """Fine intervals of the time axis, and the rays at Gauss times in them.
+
+    Attributes
+    ----------
+    times : (intervals + 1,)
+        Fine times, ascending, the first 0.
+    knots : (knots,)
+        Numbers of the knots among them.
+    first : (intervals,)
+        First of the knots of an interval's polynomial, by its number among the knots.
+    position, velocity : (intervals, points, 12)
+        From x, x', x'' at the first of the knots, at the second, and so on, to x and x' at the points.
+    """
+
+    times: FloatArray
+    knots: IntArray
+    first: IntArray
+    position: FloatArray
+    velocity: FloatArray
 
 
 def curvature_values(body: Surface, states: FloatArray) -> FloatArray:
@@ -143,8 +161,7 @@ def with_attenuation(
     *,
     rtol: float,
     step: float | None = None,
-    transport: Callable[[FloatArray, FloatArray], FloatArray] | None = None,
-    limit: int = MAX_STEPS,
+    limit: int = 100_000,
 ) -> FloatArray:
     """Advance states (n, 12) to the ascending times (m,) by one trace: (n, m, 12).
 
@@ -156,15 +173,11 @@ def with_attenuation(
         Relative tolerance per step, which sets the spacing of the fine times as well.
     step : float, optional
         Longest of equal steps, taken instead of adapted ones.
-    transport : callable, optional
-        Gives the first ten lanes of the result instead of the trace.
     limit : int
         Most steps between fine times, as for `trace_states`.
     """
     times = np.asarray(times, dtype=float)
     out = np.empty((len(states), len(times), 12))
-    if transport is not None:
-        out[..., :10] = transport(states[:, :10], times)
     spacing = fine_spacing(body, rtol, step)
     # differences of times next to the smallest number would underflow
     ends = np.unique(times[times > 1e-100 * spacing])
@@ -173,14 +186,13 @@ def with_attenuation(
         return out
     fine = sliding(ends, spacing, fine_rules()[0])
     place = np.searchsorted(fine.times, np.where(times >= ends[0], times, 0.0))
-    lanes = 10 if transport is None else 6
     adapted = rtol if step is None else 0.0
-    rays = max(1, WORKSPACE // (lanes * len(fine.times) * CHUNK)) * CHUNK
+    rays = max(1, WORKSPACE // (10 * len(fine.times) * BLOCK)) * BLOCK
     for start in range(0, len(states), rays):
         part = slice(start, start + rays)
         out[part, 0, 10:] = states[part, 10:]
         # the traced states bear no name here, or two slices would be in memory at once
-        _along(body, _traced(body, states[:, :lanes], part, fine.times, adapted, step, limit), fine, place, out[part])
+        _along(body, _traced(body, states[:, :10], part, fine.times, adapted, step, limit), fine, place, out[part])
     return out
 
 
@@ -203,8 +215,8 @@ def _along(body: Surface, states: FloatArray, fine: Sliding, place: IntArray, ou
     Parameters
     ----------
     body : Surface
-    states : (n, times, 6 or 10)
-        At the fine times; ten components are copied to ``out``.
+    states : (n, times, 10)
+        At the fine times; they are copied to ``out``.
     fine : Sliding
         Their intervals, with the Gauss points of `fine_rules`.
     place : (m,)
@@ -214,13 +226,13 @@ def _along(body: Surface, states: FloatArray, fine: Sliding, place: IntArray, ou
     """
     from creeping.geodesics.kernels.attenuation import extend_along as kernel
 
-    if states.shape[2] > 6:
-        out[..., : states.shape[2]] = states[:, place]
+    out[..., :10] = states[:, place]
 
     def run(part: slice) -> None:
         kernel(_bent(body, states[part, :, :6], fine), fine.times, (*fine_rules(), DIP), place, out[part])
 
-    in_threads(run, len(states), most=TOGETHER)
+    # what lies between the knots of 512 rays takes some 20 MB
+    in_threads(run, len(states), most=512)
 
 
 def _bent(body: Surface, states: FloatArray, fine: Sliding) -> FloatArray:
@@ -232,7 +244,7 @@ def _bent(body: Surface, states: FloatArray, fine: Sliding) -> FloatArray:
         turning = speed.value(x)[..., None] * turning + np.sum(speed.gradient(x) * along, axis=-1, keepdims=True) * p
     # x, x', x'' at the knots around each interval, by rows
     jets = np.stack([x, along, turning], axis=2)
-    around = jets[:, fine.first[:, None] + np.arange(NEAREST)].reshape(len(states), len(fine.first), 3 * NEAREST, 3)
+    around = jets[:, fine.first[:, None] + np.arange(4)].reshape(len(states), len(fine.first), 12, 3)
     between = np.concatenate([fine.position @ around, fine.velocity @ around], axis=-1)
     bent = np.empty((len(fine.first), NODES, len(states)))
     ends = curvature_values(body, states.reshape(-1, 6)).reshape(states.shape[:2]).T
@@ -240,3 +252,97 @@ def _bent(body: Surface, states: FloatArray, fine: Sliding) -> FloatArray:
     inside = curvature_values(body, between.reshape(-1, 6)).reshape(between.shape[:3])
     bent[:, 1:-1] = np.moveaxis(inside, 0, 2)
     return bent
+
+
+def trace_own(body: Any, states: FloatArray, times: FloatArray, *, rtol: float) -> FloatArray:
+    """Trace states (n, 6, 10 or 12) of an unweighted body, each to its time (n,): (n, the same), NaN where it fails.
+
+    Attenuation is a lane of the trace where kappa_n stays well above 0; elsewhere `with_attenuation` finds where rays
+    detach. Where kappa_n <= 0 at the start, the ray detaches there.
+    """
+    if states.shape[1] < WHOLE:
+        return trace_each(body, states, times, rtol=rtol)
+    out = np.empty(states.shape)
+    lanes = ATTENUATION + 1
+    out[:, :lanes] = trace_each(body, states[:, :lanes], times, rtol=rtol)
+    out[:, DETACHMENT] = states[:, DETACHMENT]
+    creeping = np.isinf(states[:, DETACHMENT]) & np.all(np.isfinite(out[:, :lanes]), axis=1)
+    first, last = curvature_values(body, states), curvature_values(body, np.nan_to_num(out))
+    parted = creeping & ~(first > 0)
+    out[parted, DETACHMENT] = 0.0
+    stays = parted | np.isfinite(states[:, DETACHMENT])
+    out[stays, ATTENUATION] = states[stays, ATTENUATION]
+    low = creeping & (first > 0) & (np.minimum(first, last) < DIP * np.maximum(first, last))
+    for time in np.unique(times[low]):
+        rows = np.flatnonzero(low & (times == time))
+        try:
+            found = with_attenuation(body, states[rows], np.array([time]), rtol=rtol, step=None)[:, 0]
+            out[rows, ATTENUATION:] = found[:, ATTENUATION:]
+        except IntegrationError:
+            out[rows] = np.nan
+    return out
+
+
+def sliding(outputs: FloatArray, spacing: float, points: FloatArray) -> Sliding:
+    """Fine intervals for distinct ascending output times > 0; points (points,) of the open unit interval."""
+    # so short a ray is its Taylor polynomial at 0: the Hermite polynomial would be rounding
+    short = outputs[-1] < 1e-4 * spacing
+    # gaps are at most 1.5 spacings: four knots at least
+    spacing = min(spacing, float(outputs[-1]) / 4)
+    fine = _divided(outputs, spacing)
+    # at closer knots the polynomial magnifies the error of the trace
+    kept = _apart(fine, 0.25 * spacing)
+    knots = fine[kept]
+    gap = np.searchsorted(knots, fine[:-1], side="right") - 1
+    first = np.clip(gap - 1, 0, len(knots) - 4)
+    nodes = knots[first[:, None] + np.arange(4)]
+    # differences first: a point of an interval next to a knot must not fall onto it
+    tau = (fine[:-1, None] - nodes)[:, None, :] + (np.diff(fine)[:, None] * points)[:, :, None]
+    position, velocity = _taylor(tau) if short else _hermite(tau, nodes)
+    shape = len(first), len(points), 12
+    return Sliding(fine, kept, first, position.reshape(shape), velocity.reshape(shape))
+
+
+def _hermite(tau: FloatArray, nodes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """H_jd and its derivative at tau = t - t_j (n, points, k), t no knot; knots (n, k): (n, points, k, 3) each."""
+    others = (np.arange(4)[:, None] + np.arange(1, 4)) % 4
+    inverse = 1 / (nodes[:, :, None] - nodes[:, others])
+    s1, s2 = np.sum(inverse, axis=-1)[:, None], np.sum(inverse**2, axis=-1)[:, None]
+    c1, c2 = -3 * s1, 4.5 * s1**2 + 1.5 * s2
+    cube = np.prod(tau[..., others] * inverse[:, None], axis=-1) ** 3
+    slope = 3 * cube * np.sum(1 / tau[..., others], axis=-1)
+    value = np.stack([1 + c1 * tau + c2 * tau**2, tau + c1 * tau**2, 0.5 * tau**2], axis=-1)
+    derivative = np.stack([c1 + 2 * c2 * tau, 1 + 2 * c1 * tau, tau], axis=-1)
+    return cube[..., None] * value, cube[..., None] * derivative + slope[..., None] * value
+
+
+def _taylor(tau: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """What `_hermite` gives, of the first knot alone."""
+    position, velocity = np.zeros((*tau.shape, 3)), np.zeros((*tau.shape, 3))
+    t = tau[..., 0]
+    position[..., 0, :] = np.stack([np.ones_like(t), t, 0.5 * t**2], axis=-1)
+    velocity[..., 0, 1:] = np.stack([np.ones_like(t), t], axis=-1)
+    return position, velocity
+
+
+def _divided(outputs: FloatArray, spacing: float) -> FloatArray:
+    """0, the outputs, and each interval between them in equal parts no longer than the spacing."""
+    starts = np.concatenate([[0.0], outputs[:-1]])
+    parts = np.maximum(np.ceil((outputs - starts) / spacing - 1e-9), 1).astype(int)
+    last = np.cumsum(parts)
+    number = np.arange(last[-1]) - np.repeat(last - parts, parts)
+    inside = np.repeat(starts, parts) + np.repeat((outputs - starts) / parts, parts) * number
+    return np.append(inside, outputs[-1])
+
+
+def _apart(times: FloatArray, least: float) -> IntArray:
+    """Numbers of times no two of which are closer than ``least``, the first and the last among them."""
+    if np.all(np.diff(times) >= least):
+        return np.arange(len(times))
+    kept = [0]
+    for number, time in enumerate(times):
+        if time - times[kept[-1]] >= least:
+            kept.append(number)
+    # the last takes the place of a neighbour too close to it
+    kept[-1] = len(times) - 1
+    return np.array(kept)

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from creeping._presenting import Shown, brief
 from creeping._typing import ArrayLike, FloatArray
 from creeping.geodesics.attenuation import with_attenuation
-from creeping.geodesics.bundle import bundle_states
 from creeping.geodesics.integrator import ErrorEstimate, as_times, trace_states
 from creeping.geodesics.pieces import with_ends
-from creeping.geodesics.states import checked_states, unpack
+from creeping.geodesics.states import bundle_states, checked_states, unpack
 from creeping.geometry.arguments import checked_body, number_between, one_of, positive_number
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface

@@ -13,18 +13,15 @@ import numpy as np
 
 from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import IntegrationError, InvalidInputError
-from creeping.geodesics.bundle import bundle_states
-from creeping.geodesics.states import unpack
+from creeping.geodesics.states import bundle_states, unpack
 from creeping.geodesics.tableaus import DORMAND_PRINCE_8, Method, dense_weights
 from creeping.geometry.arguments import checked_body, number_between, real_array
 from creeping.geometry.evaluators import evaluators
 from creeping.geometry.piecewise import checked_smooth
 from creeping.geometry.surface import Surface, size
-from creeping.kernels.threads import CHUNK, in_threads, pause
+from creeping.kernels.threads import BLOCK, in_slices, in_threads, pause
 from creeping.storage.memory import within_budget
 
-MAX_STEPS = 100_000
-"""Steps between two outputs after which a block of rays is given up."""
 BUDGET = 4000
 """Steps of blocks after which the kernel comes up for signals: 0.01 s of a closed form, 0.2 s of a spline."""
 
@@ -124,12 +121,14 @@ def trace_states(
     rtol: float = 1e-10,
     step: float | None = None,
     method: Method = DORMAND_PRINCE_8,
-    limit: int = MAX_STEPS,
+    limit: int = 100_000,
+    taken: list[int] | None = None,
 ) -> FloatArray:
     """Trace states (n, 6, 10 or 11) to the ascending times (m,): (n, m, the same).
 
     ``rtol = 0`` takes equal steps of at most ``step`` between outputs, by any ``method``; else it is the first.
-    Rays that need more than ``limit`` steps between outputs, and those of their block, fail.
+    Rays that need more than ``limit`` steps between outputs, and those of their block, fail. ``taken`` gets the steps
+    of blocks of rays, refused ones too.
     Lanes 6 to 9 are the columns of the Jacobi matrix of the metric ds/c, lane 10 the attenuation integral; see
     `creeping.geodesics.kernels.integrator`.
 
@@ -140,20 +139,6 @@ def trace_states(
     IntegrationError
         If a ray does not reach its end; ``failed`` lists the rays.
     """
-    return counted_states(body, states, times, rtol=rtol, step=step, method=method, limit=limit)[0]
-
-
-def counted_states(
-    body: Surface,
-    states: FloatArray,
-    times: FloatArray,
-    *,
-    rtol: float = 1e-10,
-    step: float | None = None,
-    method: Method = DORMAND_PRINCE_8,
-    limit: int = MAX_STEPS,
-) -> tuple[FloatArray, int]:
-    """Do what `trace_states` does, and count the steps of all blocks of rays, refused ones too."""
     if states.shape[1] > 11:
         raise InvalidInputError(f"states of {states.shape[1]} lanes; at most 11 are traced, see `attenuation`")
     if rtol > 0 and method != DORMAND_PRINCE_8:
@@ -169,12 +154,12 @@ def counted_states(
     states = np.ascontiguousarray(states, dtype=float)
     scale = error_scale(body, states.shape[1])
     ends = np.ascontiguousarray(times, dtype=float)
-    taken: list[int] = []
+    taken = [] if taken is None else taken
     controls = scale, float(rtol), float(step), int(limit), BUDGET
     with evaluators(body) as parts:
 
         def run(part: slice) -> None:
-            at, kept = np.zeros(8), np.empty((2, states.shape[1] * CHUNK))
+            at, kept = np.zeros(8), np.empty((2, states.shape[1] * BLOCK))
             while not integrate(*parts, states[part], ends, method, dense_weights(), *controls, at, kept, out[part]):
                 pause()
             taken.append(int(at[7]))
@@ -185,14 +170,26 @@ def counted_states(
         raise IntegrationError(
             f"{len(failed)} of {len(states)} rays left the finite numbers or needed more than {limit} steps "
             f"(first: ray {failed[0]}); "
-            + (
-                f"shorten the step {step:.3g}, unless that many are needed"
-                if rtol == 0
-                else "check the body with check_surface"
-            ),
+            + (f"shorten the step {step:.3g}, unless that many are needed" if rtol == 0 else "run check_surface"),
             failed=failed,
         )
-    return out, sum(taken)
+    return out
+
+
+def trace_each(body: Surface, states: FloatArray, times: FloatArray, *, rtol: float) -> FloatArray:
+    """Trace states (n, 6, 10 or 11) each to its time (n,): (n, the same), NaN of a ray that does not come there.
+
+    Each ray has steps of its own by the relative tolerance, so that it does not depend on its company.
+    """
+    from creeping.geodesics.kernels.integrator import integrate_own
+
+    states, out = np.ascontiguousarray(states, dtype=float), np.empty(states.shape)
+    times = np.ascontiguousarray(times, dtype=float)
+    # an interval takes a few steps, next to a tip some tens: a ray that takes 500 is given up
+    controls = error_scale(body, states.shape[1]), rtol, 0.05 * size(body), 500
+    with evaluators(body) as parts, np.errstate(all="ignore"):
+        in_slices(lambda some: integrate_own(*parts, states[some], times[some], *controls, out[some]), len(states))
+    return out
 
 
 def error_scale(body: Surface, lanes: int) -> FloatArray:

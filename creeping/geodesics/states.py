@@ -1,4 +1,8 @@
-"""What is carried along a ray, by the names of its components.
+"""Points (x, p) of the unit tangent bundle T1Q = {F(x) = 0, p.grad F(x) = 0, |p| = 1}, and what rays carry from there.
+
+Projection: x <- x - F grad F/|grad F|^2 until |F| is at rounding level, p <- its tangential part, normalised.
+
+What is carried along a ray, by the names of its components:
 
     x (3), p (3) | M11, M21, M12, M22 | A | t1 | t2, crease
 
@@ -7,18 +11,23 @@ M is the Jacobi matrix of the metric ds/c, A the attenuation integral, t1 the ti
 body with creases all 14, the last two the time at which the ray ended at a crease and the number of that (inf and -1
 before); see `creeping.geodesics.pieces`.
 
-Also here: rays between the states to which they are traced, coarsely: cubics with the directions at both ends, and
-chords.
-
-Enough to ask on which piece of a body a ray is, SAMPLE by SAMPLE; `hermite` is what integrals are taken along.
+Sources: [YC06b]; Derivations, R1.
 """
 
 import numpy as np
 
-from creeping._typing import Any, FloatArray, IntArray
-from creeping.errors import InvalidInputError
+from creeping._typing import Any, ArrayLike, FloatArray, IntArray
+from creeping.errors import InvalidInputError, SurfaceError
 from creeping.geometry.arguments import real_array
+from creeping.geometry.evaluators import evaluators, is_compiled, polar_frame
 from creeping.geometry.piecewise import is_piecewise
+from creeping.geometry.surface import Surface, normal, project, size
+from creeping.kernels.threads import in_threads
+
+OFF_BODY = 1e-3
+"""Largest distance of a given point from the body, in units of its size, that projection silently mends."""
+NORMAL = 1e-6
+"""Least tangential part of a direction."""
 
 X, P = slice(0, 3), slice(3, 6)
 M11, M21, M12, M22 = range(6, 10)
@@ -73,49 +82,168 @@ def known_steps(states: FloatArray, times: FloatArray) -> IntArray | None:
     return np.searchsorted(times, states[:, -1, END], side="right") if states.shape[-1] > WHOLE else None
 
 
-def windows(times: FloatArray, gap: float, most: float) -> list[tuple[FloatArray, list[tuple[int, int]]]]:
-    """Stops from 0 through ascending times, ``gap`` apart at most, in runs no longer than ``most``.
+def project_bundle(body: Surface, points: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Bring points, L, and directions onto T1Q: (..., 3), (..., 3) -> (..., 3), (..., 3)."""
+    points = project(body, points)
+    n = normal(body, points)
+    tangent = directions - np.sum(directions * n, axis=-1, keepdims=True) * n
+    return points, tangent / np.linalg.norm(tangent, axis=-1, keepdims=True)
 
-    Of each run the stops, and which of them are which of the times.
 
-    Examples
-    --------
-    >>> [(stops.tolist(), wanted) for stops, wanted in windows(np.array([0.0, 1.0, 4.0]), 2.0, 3.0)]
-    [([0.0, 1.0, 2.5], [(0, 0), (1, 1)]), ([2.5, 4.0], [(1, 2)])]
+def bundle_states(body: Surface, points: ArrayLike, directions: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:
+    """Check points and directions of a caller, broadcast them together and project them onto T1Q.
+
+    Parameters
+    ----------
+    body : Surface
+    points : (..., 3), L
+        Points on the body, or within 1e-3 of its size from it.
+    directions : (..., 3)
+        Directions, not normal to the body; need not be unit nor exactly tangent.
+
+    Returns
+    -------
+    states : (n, 6)
+    shape : tuple
+        (..., 3) of points and directions together.
+
+    Raises
+    ------
+    InvalidInputError
+        On a wrong shape, a value that is not finite, a point off the body, a direction that is zero or normal.
     """
-    stops, places = [0.0], []
-    for time in times:
-        parts = int(np.ceil((time - stops[-1]) / gap * (1 - 1e-9)))
-        stops.extend(np.linspace(stops[-1], time, max(parts, 0) + 1)[1:].tolist())
-        places.append(len(stops) - 1)
-    every, runs, begin = np.array(stops), list[tuple[FloatArray, list[tuple[int, int]]]](), 0
-    while True:
-        end = int(np.searchsorted(every, every[begin] + most * (1 + 1e-9), side="right")) - 1
-        end = min(max(end, begin + 1), len(every) - 1)
-        wanted = [(at - begin, column) for column, at in enumerate(places) if begin < at <= end or at == begin == 0]
-        runs.append((every[begin : end + 1], wanted))
-        if end == len(every) - 1:
-            return runs
-        begin = end
+    try:
+        x, p = np.broadcast_arrays(real_array(points, "points"), real_array(directions, "directions"))
+    except InvalidInputError:
+        raise
+    except ValueError as error:
+        raise InvalidInputError(f"points and directions are not arrays that broadcast together: {error}") from error
+    if x.ndim == 0 or x.shape[-1] != 3:
+        raise InvalidInputError(f"points have shape {np.shape(points)}; the last axis must hold x, y, z")
+    flat = np.ascontiguousarray(x.reshape(-1, 3)), np.ascontiguousarray(p.reshape(-1, 3))
+    states = _entered(body, *flat) if is_compiled(body) else None
+    return (_checked(body, *flat) if states is None else states), x.shape
 
 
-def cubics(a: FloatArray, b: FloatArray, long: FloatArray, shares: FloatArray) -> FloatArray:
-    """Points at shares (m,) of the cubics between neighbouring states (n, k, lanes), ``long`` (n, k): (n, k, m, 3)."""
-    u, h = shares[:, None], long[..., None, None]
-    ends = (1 - u) ** 2 * (1 + 2 * u) * a[..., None, X] + u**2 * (3 - 2 * u) * b[..., None, X]
-    return np.asarray(ends + h * u * (1 - u) * ((1 - u) * a[..., None, P] - u * b[..., None, P]))
+def _entered(body: Surface, x: FloatArray, p: FloatArray) -> FloatArray | None:
+    """What `_checked` gives, none where it raises."""
+    from creeping.geodesics.kernels.flow_derivative import enter
+
+    out, refused, length = np.empty((len(x), 6)), [0], size(body)
+    with evaluators(body) as parts:
+        level = parts.level, parts.level_parameters
+
+        def run(part: slice) -> None:
+            refused.append(enter(*level, x[part], p[part], OFF_BODY * length, 1e-15 * length, NORMAL, out[part]))
+
+        in_threads(run, len(x))
+    return None if sum(refused) else out
 
 
-def cubic_at(a: FloatArray, b: FloatArray, long: FloatArray, share: FloatArray) -> FloatArray:
-    """Points at shares (n, m) of each cubic: (n, m, 3)."""
-    u, h = share[..., None], long[:, None, None]
-    ends = (1 - u) ** 2 * (1 + 2 * u) * a[:, None, X] + u**2 * (3 - 2 * u) * b[:, None, X]
-    return np.asarray(ends + h * u * (1 - u) * ((1 - u) * a[:, None, P] - u * b[:, None, P]))
+def _checked(body: Surface, x: FloatArray, p: FloatArray) -> FloatArray:
+    """States (n, 6) of points and directions (n, 3), by the body's own methods."""
+    for name, values in (("points", x), ("directions", p)):
+        bad = ~np.all(np.isfinite(values), axis=-1)
+        if bad.any():
+            raise InvalidInputError(f"{int(bad.sum())} of {bad.size} {name} are not finite")
+    length = np.linalg.norm(p, axis=-1, keepdims=True)
+    if np.any(length == 0):
+        raise InvalidInputError(f"{int(np.sum(length == 0))} of {length.size} directions are zero")
+    x = on_body(body, x)
+    n = normal(body, x)
+    p = p / length
+    tangent = p - np.sum(p * n, axis=-1, keepdims=True) * n
+    norm = np.linalg.norm(tangent, axis=-1, keepdims=True)
+    if np.any(norm < NORMAL):
+        raise InvalidInputError(
+            f"{int(np.sum(norm < NORMAL))} of {norm.size} directions are normal to the body; a ray needs a tangent"
+        )
+    return np.concatenate([x, tangent / norm], axis=1)
 
 
-def nearest_on(path: FloatArray, point: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Share of each chord of paths (n, m + 1, 3) at which it is nearest to a point, and how near: (n, m), (n, m)."""
-    along, away = np.diff(path, axis=1), point - path[:, :-1]
-    with np.errstate(invalid="ignore"):
-        share = np.clip(np.sum(away * along, axis=-1) / np.maximum(np.sum(along**2, axis=-1), 1e-300), 0.0, 1.0)
-        return share, np.asarray(np.linalg.norm(away - share[..., None] * along, axis=-1))
+def as_points(points: ArrayLike) -> FloatArray:
+    """Points of a caller as an array (..., 3).
+
+    Raises
+    ------
+    InvalidInputError
+        If they are not numbers, of another shape, or not finite.
+    """
+    x = real_array(points, "points")
+    if x.ndim == 0 or x.shape[-1] != 3:
+        raise InvalidInputError(f"points have shape {x.shape}; the last axis must hold x, y, z")
+    # beyond, neither a phase nor a distance has digits left
+    bad = ~np.all(np.abs(x) <= 1e15, axis=-1)
+    if bad.any():
+        raise InvalidInputError(
+            f"{int(bad.sum())} of {bad.size} points are not finite, or beyond 1e+15 "
+            f"(first: row {int(np.argmax(bad.ravel()))})"
+        )
+    return x
+
+
+def on_body(body: Surface, points: FloatArray) -> FloatArray:
+    """Put points, L, within 1e-3 body sizes of the body on it: (..., 3) -> (..., 3).
+
+    Raises
+    ------
+    InvalidInputError
+        On a point farther off.
+    """
+    # to the first order
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = np.abs(body.level(points)) / np.linalg.norm(body.gradient(points), axis=-1)
+    off = ~(distance <= OFF_BODY * size(body))
+    if off.any():
+        worst = float(np.nanmax(np.where(off, distance, 0.0)))
+        raise InvalidInputError(
+            f"{int(off.sum())} of {off.size} points are off the body (worst by {worst:.3g} L); project them first",
+            count=int(off.sum()),
+            worst=worst,
+        )
+    return project(body, points)
+
+
+def random_bundle_points(body: Surface, count: int, *, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    """Draw points of T1Q uniformly by area and angle: (count, 3), (count, 3).
+
+    A point is drawn in the unit square of a chart and kept if the atlas assigns it to that chart, with a probability
+    proportional to |x_u x x_v|.
+
+    Raises
+    ------
+    SurfaceError
+        If no point of the charts is assigned to its own chart.
+    """
+    charts = body.atlas.charts
+    probe = rng.random((64, 2))
+    largest = 1.5 * max(float(np.max(_area_element(chart.tangents(probe)))) for chart in charts)
+    found: list[FloatArray] = []
+    for _ in range(1000):
+        number = rng.integers(len(charts), size=4 * count)
+        uv = rng.random((4 * count, 2))
+        keep = rng.random(4 * count)
+        for index, chart in enumerate(charts):
+            mine = uv[number == index]
+            points = chart.point(mine)
+            accepted = _area_element(chart.tangents(mine)) > keep[number == index] * largest
+            accepted &= body.atlas.locate(points)[0] == index
+            found.append(points[accepted])
+        if sum(map(len, found)) >= count:
+            break
+    else:
+        raise SurfaceError("the atlas assigns almost none of its charts' points to their own chart; run check_surface")
+    # charts were visited in order: mix before cutting, or the last charts would be missing
+    points = rng.permutation(np.concatenate(found))[:count]
+    angle = 2 * np.pi * rng.random(count)
+    chosen, uv = body.atlas.locate(points)
+    directions = np.empty_like(points)
+    for k, chart in enumerate(charts):
+        mine = chosen == k
+        frame = polar_frame(chart.tangents(uv[mine]))
+        directions[mine] = frame[..., 0] * np.cos(angle[mine, None]) + frame[..., 1] * np.sin(angle[mine, None])
+    return project_bundle(body, points, directions)
+
+
+def _area_element(tangents: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.norm(np.cross(tangents[..., 0], tangents[..., 1]), axis=-1))

@@ -12,16 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from creeping._typing import Any, FloatArray
-
-
-class Tableau(NamedTuple):
-    """Explicit Runge-Kutta method: stage matrix a, weights b, error weights e3 and e5 (zero: no estimate)."""
-
-    a: FloatArray
-    b: FloatArray
-    e3: FloatArray
-    e5: FloatArray
+from creeping._typing import FloatArray
 
 
 class Method(NamedTuple):
@@ -35,46 +26,26 @@ DORMAND_PRINCE_8 = Method(0, 12)
 """The order-8 pair, the only one that estimates errors and has dense output."""
 RUNGE_KUTTA_4 = Method(16, 4)
 """The classical method of order 4, the integrator of the burn-in."""
-SOLUTION, THIRD, FIFTH = 12, 21, 22
-"""Rows of the order-8 pair: its solution and the two error estimates."""
 STAGES = 16
 """Stages of the order-8 pair with y1 and those of the dense output."""
 
 
-def _pair() -> Any:
-    from scipy.integrate import DOP853
-
-    return DOP853
-
-
-@cache
-def dormand_prince_8() -> Tableau:
-    """The order-8 pair with its error estimates of order 3 and 5."""
-    return Tableau(*(np.ascontiguousarray(v, dtype=float) for v in (_pair().A, _pair().B, _pair().E3, _pair().E5)))
-
-
-@cache
-def runge_kutta_4() -> Tableau:
-    """The classical method of order 4."""
-    a = np.array([[0.0, 0, 0, 0], [0.5, 0, 0, 0], [0, 0.5, 0, 0], [0, 0, 1, 0]])
-    return Tableau(a, np.array([1, 2, 2, 1]) / 6, np.zeros(5), np.zeros(5))
-
-
 @cache
 def _stage_weights() -> list[list[float]]:
-    pair, classical = dormand_prince_8(), runge_kutta_4()
+    from scipy.integrate import DOP853
+
     out = np.zeros((23, STAGES))
-    out[:12, :12], out[SOLUTION, :12], out[13:16] = pair.a, pair.b, _pair().A_EXTRA
-    out[16:20, :4], out[20, :4] = classical.a, classical.b
-    out[THIRD, :13], out[FIFTH, :13] = pair.e3, pair.e5
+    out[:12, :12], out[12, :12], out[13:16] = DOP853.A, DOP853.B, DOP853.A_EXTRA
+    out[17, 0], out[18, 1], out[19, 2], out[20, :4] = 0.5, 0.5, 1.0, np.array([1, 2, 2, 1]) / 6
+    out[21, :13], out[22, :13] = DOP853.E3, DOP853.E5
     return out.tolist()
 
 
 STAGE_WEIGHTS = _stage_weights
 """Weights of all sums over stages that a step takes, (23, STAGES), when asked for: scipy takes its time to come.
 
-Stages 0 to 11 of the order-8 pair, its solution, the three stages of its dense output; stages 0 to 3 of the classical
-method, its solution; the error estimates.
+Stages 0 to 11 of the order-8 pair, its solution, row 12, the three stages of its dense output; stages 0 to 3 of the
+classical method, its solution; the error estimates of order 3 and 5, rows 21 and 22.
 """
 
 
@@ -85,8 +56,10 @@ def dense_weights() -> FloatArray:
     The interpolant is sum_i F_i phi_i, phi = theta, theta (1 - theta), theta^2 (1 - theta), ..., alternately, with
     F_0 = y1 - y, F_1 = h k_0 - F_0, F_2 = 2 F_0 - h (k_0 + k_12) and four rows of weights more.
     """
-    difference, begins, ends = np.array(STAGE_WEIGHTS()[SOLUTION]), np.eye(STAGES)[0], np.eye(STAGES)[12]
-    parts = np.vstack([difference, begins - difference, 2 * difference - begins - ends, _pair().D])
+    from scipy.integrate import DOP853
+
+    difference, begins, ends = np.array(STAGE_WEIGHTS()[12]), np.eye(STAGES)[0], np.eye(STAGES)[12]
+    parts = np.vstack([difference, begins - difference, 2 * difference - begins - ends, DOP853.D])
     basis, out = np.poly1d([1.0]), np.zeros((7, STAGES))
     for i, part in enumerate(parts):
         out[7 - len(basis.coeffs) :] += basis.coeffs[:, None] * part

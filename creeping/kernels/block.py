@@ -9,14 +9,12 @@ import numpy as np
 from numba import njit
 
 from creeping._typing import Any
-from creeping.kernels.cache import discard_stale
+from creeping.kernels.cache import discard_stale, keep_private
 from creeping.kernels.first_use import watch
-from creeping.kernels.private_cache import keep_private
+from creeping.kernels.threads import BLOCK as BLOCK
 
 _digest = discard_stale(Path(__file__).parents[1])
 keep_private(Path(__file__).parents[1], _digest)
-
-BLOCK = 64
 
 _common: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 # of kernels that Python calls

@@ -22,10 +22,6 @@ from numba.experimental import function_type as _function_type  # noqa: F401
 
 from creeping._typing import Any, FloatArray
 
-_ROW, _ROWS, _WHOLE = types.float64[::1], types.float64[:, ::1], types.int64[::1]
-_LEVEL = types.void(_ROWS, _ROW, _ROWS, _ROWS, _ROW)
-_LOCATOR = types.void(_ROWS, _ROWS, _WHOLE, _ROWS, _ROWS, _ROW)
-
 
 class BlockCallback(types.WrapperAddressProtocol):  # type: ignore[misc]
     """A Python function that kernels take in the place of a compiled one.
@@ -88,10 +84,6 @@ class BlockCallback(types.WrapperAddressProtocol):  # type: ignore[misc]
                 if number not in self._inputs:
                     array[...] = np.nan if array.dtype.kind == "f" else 0
 
-    def note(self, error: BaseException) -> None:
-        """Let `raise_failure` raise this; what is left of the call is passed over."""
-        self._failure = error
-
     def raise_failure(self) -> None:
         """Raise what the function has raised since the last call of this or of `forget_failure`."""
         failure = self._failure
@@ -129,7 +121,8 @@ def noted_interrupts() -> Iterator[None]:
         except BaseException as error:
             if met is None:
                 raise
-            met.note(error)
+            # what is left of the call is passed over
+            met._failure = error
 
     signal.signal(signal.SIGINT, noting)
     try:
@@ -140,9 +133,11 @@ def noted_interrupts() -> Iterator[None]:
 
 def level_callback(function: Callable[..., None]) -> BlockCallback:
     """Callback for a level: ``function(points (3, n), F (n,), gradients (3, n), Hessians (6, n), _)``."""
-    return BlockCallback(function, _LEVEL, (0,))
+    row, rows = types.float64[::1], types.float64[:, ::1]
+    return BlockCallback(function, types.void(rows, row, rows, rows, row), (0,))
 
 
 def locator_callback(function: Callable[..., None]) -> BlockCallback:
     """Callback for a locator: ``function(points (3, n), gradients (3, n), chart (n,), uv (2, n), frame (6, n), _)``."""
-    return BlockCallback(function, _LOCATOR, (0, 1))
+    row, rows = types.float64[::1], types.float64[:, ::1]
+    return BlockCallback(function, types.void(rows, rows, types.int64[::1], rows, rows, row), (0, 1))

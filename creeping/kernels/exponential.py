@@ -36,44 +36,28 @@ from numba import njit
 
 from creeping.kernels.block import options, strict_options
 
-LOWEST, HIGHEST = -700.0, 700.0
-"""Arguments beyond are taken for these: e^x is no number there, or nothing."""
-_PER_LN_2 = 1 / math.log(2.0)
-_LN_2_HIGH = 0.693147180369123816490
-"""With 32 zeros at its end: n times it is exact."""
-_LN_2_LOW = 1.90821492927058770002e-10
-_BITS = 1.5 * 2.0**52
-"""A number n added to it stands in its last bits."""
-C2, C3, C4, C5, C6, C7, C8, C9, C10, C11, C12, C13 = (1 / math.factorial(n) for n in range(2, 14))
-_PER_TURN = 0.5 / math.pi
-
-LEAST, LARGEST = 1e-90, 1e90
-"""Between which x is taken to lie: the root of less is one of 0, to 1e-30."""
-_WHOLE = 2.0**52
-"""A whole number added to it stands in its last bits."""
-_HIGH = 4.0 / 3.0 * 1023 * 2.0**20 - 0.1035 * 2.0**20
-"""Upper half of the guess's bits at x whose own are 0; its last term makes errors of both signs alike."""
-ROUNDS = 5
-
-_TAN_PI_8 = math.tan(math.pi / 8)
-_S = np.array([(-1.0) ** j * math.pi ** (2 * j + 1) / math.factorial(2 * j + 1) for j in range(10)])
-_C = np.array([(-1.0) ** j * math.pi ** (2 * j) / math.factorial(2 * j) for j in range(11)])
-S0, S1, S2, S3, S4, S5, S6, S7, S8, S9 = (float(v) for v in _S)
-C0, C1, TURNS_C2, TURNS_C3, TURNS_C4, TURNS_C5, TURNS_C6, TURNS_C7, TURNS_C8, TURNS_C9, TURNS_C10 = (
-    float(v) for v in _C
-)
+INVERSE_FACTORIALS = tuple(1 / math.factorial(n) for n in range(14))
+LEAST = 1e-90
+"""Cube roots are of no less: the root of less is one of 0, to 1e-30."""
+SINE = tuple((-1.0) ** j * math.pi ** (2 * j + 1) / math.factorial(2 * j + 1) for j in range(10))
+COSINE = tuple((-1.0) ** j * math.pi ** (2 * j) / math.factorial(2 * j) for j in range(11))
+"""Coefficients of sin(pi t)/t and cos(pi t) in powers of t^2."""
 
 
 # to the letter: sums that may be reordered would put the two parts of ln 2 together
 @njit(**strict_options, forceinline=True)
 def exponential(x):
     """e^x, to 4e-16 of itself."""
-    x = min(max(x, LOWEST), HIGHEST)
-    n = math.floor(x * _PER_LN_2 + 0.5)
-    r = (x - n * _LN_2_HIGH) - n * _LN_2_LOW
-    p = C8 + r * (C9 + r * (C10 + r * (C11 + r * (C12 + r * C13))))
-    p = 1.0 + r * (1.0 + r * (C2 + r * (C3 + r * (C4 + r * (C5 + r * (C6 + r * (C7 + r * p)))))))
-    power = (np.float64(n + _BITS).view(np.int64) << 52) + (np.int64(1023) << 52)
+    # beyond, e^x is no number, or nothing
+    x = min(max(x, -700.0), 700.0)
+    n = math.floor(x * (1 / math.log(2.0)) + 0.5)
+    # the upper part of ln 2 has 32 zeros at its end: n times it is exact
+    r = (x - n * 0.693147180369123816490) - n * 1.90821492927058770002e-10
+    c = INVERSE_FACTORIALS
+    p = c[8] + r * (c[9] + r * (c[10] + r * (c[11] + r * (c[12] + r * c[13]))))
+    p = 1.0 + r * (1.0 + r * (c[2] + r * (c[3] + r * (c[4] + r * (c[5] + r * (c[6] + r * (c[7] + r * p)))))))
+    # a whole number added to 1.5 2^52 stands in its last bits
+    power = (np.float64(n + 1.5 * 2.0**52).view(np.int64) << 52) + (np.int64(1023) << 52)
     return p * np.int64(power).view(np.float64)
 
 
@@ -81,20 +65,24 @@ def exponential(x):
 def wave(real, imaginary):
     """Real and imaginary part of e^(a + ib)."""
     size = exponential(real)
-    cosine, sine = cosine_sine(imaginary * _PER_TURN)
+    cosine, sine = cosine_sine(imaginary * (0.5 / math.pi))
     return size * cosine, size * sine
 
 
 # to the letter: sums that may be reordered would undo the guess
 @njit(**strict_options, forceinline=True)
 def cube_root(x):
-    """x^(1/3) to 8e-16 of itself for LEAST <= x <= LARGEST, 0 below."""
-    inside = min(max(x, LEAST), LARGEST)
-    bits = (np.float64(inside).view(np.int64) >> 32) + np.float64(_WHOLE).view(np.int64)
-    high = np.int64(bits).view(np.float64) - _WHOLE
-    guess = np.float64(np.floor(_HIGH - high * (1 / 3)) + _WHOLE).view(np.int64) << 32
+    """x^(1/3) to 8e-16 of itself for LEAST <= x <= 1e90, 0 below."""
+    inside = min(max(x, LEAST), 1e90)
+    # a whole number added to 2^52 stands in its last bits
+    whole = 2.0**52
+    bits = (np.float64(inside).view(np.int64) >> 32) + np.float64(whole).view(np.int64)
+    high = np.int64(bits).view(np.float64) - whole
+    # upper half of the guess's bits at x whose own are 0; the last term makes errors of both signs alike
+    most = 4.0 / 3.0 * 1023 * 2.0**20 - 0.1035 * 2.0**20
+    guess = np.float64(np.floor(most - high * (1 / 3)) + whole).view(np.int64) << 32
     r = np.int64(guess).view(np.float64)
-    for _ in range(ROUNDS):
+    for _ in range(5):
         r = r * (4.0 - inside * r * r * r) * (1 / 3)
     root = inside * r * r
     return root if x >= LEAST else 0.0
@@ -129,7 +117,7 @@ def turns(across, along):
     a, b = abs(across), abs(along)
     low, high = min(a, b), max(a, b)
     # atan(low/high) = pi/4 + atan((low - high)/(low + high)) keeps the argument below tan(pi/8)
-    steep = low > _TAN_PI_8 * high
+    steep = low > (math.sqrt(2.0) - 1.0) * high
     top = low - high if steep else low
     bottom = low + high if steep else high
     z = top / (bottom if bottom > 0.0 else 1.0)
@@ -156,8 +144,10 @@ def cosine_sine(turns):
     """Cosine and sine of an angle in turns."""
     t = turns - math.floor(turns + 0.5)
     z = t * t
-    s = S0 + z * (S1 + z * (S2 + z * (S3 + z * (S4 + z * (S5 + z * (S6 + z * (S7 + z * (S8 + z * S9))))))))
-    c = TURNS_C5 + z * (TURNS_C6 + z * (TURNS_C7 + z * (TURNS_C8 + z * (TURNS_C9 + z * TURNS_C10))))
-    c = C0 + z * (C1 + z * (TURNS_C2 + z * (TURNS_C3 + z * (TURNS_C4 + z * c))))
+    a, b = SINE, COSINE
+    s = a[4] + z * (a[5] + z * (a[6] + z * (a[7] + z * (a[8] + z * a[9]))))
+    s = a[0] + z * (a[1] + z * (a[2] + z * (a[3] + z * s)))
+    c = b[5] + z * (b[6] + z * (b[7] + z * (b[8] + z * (b[9] + z * b[10]))))
+    c = b[0] + z * (b[1] + z * (b[2] + z * (b[3] + z * (b[4] + z * c))))
     s *= t
     return 1.0 - 2.0 * s * s, 2.0 * s * c

@@ -24,8 +24,6 @@ from creeping.kernels.threads import thread_count
 
 AHEAD = "creeping.commands.upkeep"
 """Module that compiles ahead; by name, for it stands above."""
-OF_RAYS = "exponential.*.nbi"
-"""Kernels in the same folder that every trace of rays has."""
 STAMP = "ahead.done"
 """File that says for which sources all has been compiled."""
 PATIENT = 50_000, 50, 100
@@ -90,7 +88,8 @@ def watch(folder: Path, digest: str) -> None:
 def begin(first: str) -> None:
     """Compile ahead for who comes to the kernels of the module ``first`` soon, where those of rays are not yet kept."""
     for listener in _watching:
-        if not any(listener.folder.glob(OF_RAYS)):
+        # kernels in the same folder that every trace of rays has
+        if not any(listener.folder.glob("exponential.*.nbi")):
             listener.begin(first)
 
 

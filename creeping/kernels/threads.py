@@ -15,14 +15,10 @@ from time import perf_counter
 from creeping._typing import Any
 from creeping.errors import InvalidInputError
 
-LEAST = 2048
-"""Fewest rays worth a thread."""
-CHUNK = 64
-"""Slices end at multiples of this, the kernels' block: results do not depend on them."""
+BLOCK = 64
+"""Rays of a kernel's block. Slices end at multiples of it: results do not depend on them."""
 SLICE = 0.1
 """Seconds that a kernel may keep the signals waiting."""
-FIRST = 64
-"""Rows of the first slice, before it is known what one takes."""
 
 
 class _Stopped(BaseException):
@@ -99,7 +95,7 @@ class _Slices:
                 self._size = self._whole((part.stop - part.start) * min(4.0, max(0.25, share)))
 
 
-def in_slices(work: Callable[[slice], None], count: int, *, multiple: int = CHUNK) -> None:
+def in_slices(work: Callable[[slice], None], count: int, *, multiple: int = BLOCK) -> None:
     """Call ``work`` on slices that cover range(count), one after the other, in this thread.
 
     Parameters
@@ -110,16 +106,16 @@ def in_slices(work: Callable[[slice], None], count: int, *, multiple: int = CHUN
     multiple : int
         Slices end at multiples of this.
     """
-    _Slices(count, FIRST, count + multiple, multiple, even=False).work(work)
+    _Slices(count, BLOCK, count + multiple, multiple, even=False).work(work)
 
 
 def in_threads(
     work: Callable[[slice], None],
     count: int,
     *,
-    least: int = LEAST,
-    multiple: int = CHUNK,
-    first: int = FIRST,
+    least: int = 2048,
+    multiple: int = BLOCK,
+    first: int = BLOCK,
     most: int | None = None,
     even: bool = False,
 ) -> None:
@@ -132,8 +128,9 @@ def in_threads(
     work, count, multiple
         As for `in_slices`.
     least : int
+        Fewest rows worth a thread; of rays by default.
     first : int
-        Rows of the first slice, where one may take long.
+        Rows of the first slice, before it is known what one takes.
     most : int, optional
         Rows of the longest slice.
     even : bool

@@ -15,26 +15,18 @@ import numpy as np
 from creeping._typing import Any, FloatArray
 from creeping.errors import ToleranceError
 from creeping.geodesics.attenuation import NODES, chebyshev_times, curvature_values
-from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.integrator import ErrorEstimate, trace_states
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import pack, random_bundle_points
 from creeping.geodesics.tableaus import RUNGE_KUTTA_4
 from creeping.geometry.checks import check_surface
 from creeping.geometry.surface import Surface, fingerprint
-from creeping.phaseflow.coordinates.base import AmbientModel, Model, nodes_of
-from creeping.phaseflow.coordinates.rotation import CompiledModel, packed_lanes, with_flags
+from creeping.phaseflow.coordinates import AmbientModel, Model, nodes_of
 from creeping.phaseflow.phase_map import ErrorGrowth, PhaseMap
-from creeping.phaseflow.splines import PACKED, Grid, Leap, prefilter
+from creeping.phaseflow.rotation import CompiledModel, packed_lanes, with_flags
+from creeping.phaseflow.splines import Grid, Leap, prefilter
 
-SAMPLES = 2000
-"""Random points of T1Q at which a finished map is measured: one ray in a hundred may carry most of the error."""
-CHUNK = 65_536
-"""Nodes traced at a time."""
-UNMEASURED = ErrorEstimate(float("nan"), float("nan"), 0)
-RESOLVED = 1e-7
-"""Error of the attenuation over a natural horizon by polynomials through Chebyshev times."""
-_CHECKED: set[str] = set()
+_checked: set[str] = set()
 
 
 Progress = Callable[[str], None]
@@ -58,7 +50,7 @@ class Plan:
     reach : float
         Longest horizon over which curvatures are carried, in natural ones; see `curvature_reach`.
     tolerance : float
-        Of the attenuation over a leap; see `packing`.
+        Of the attenuation over a leap; see `rotation`.
     """
 
     horizon: float
@@ -74,9 +66,9 @@ class Plan:
 def curvature_reach(tolerance: float) -> float:
     """Natural horizons over which the Chebyshev times resolve the curvature well enough for a tolerance.
 
-    Over one of them the attenuation errs by about RESOLVED, and by its eighth power over more.
+    Over one of them the attenuation errs by about 1e-7, and by its eighth power over more.
     """
-    return float(max(1.0, (tolerance / RESOLVED) ** (1 / 8)))
+    return float(max(1.0, (tolerance / 1e-7) ** (1 / 8)))
 
 
 def build_direct(body: Surface, model: Model, plan: Plan, progress: Progress, *, rtol: float) -> PhaseMap:
@@ -100,7 +92,7 @@ def build_direct(body: Surface, model: Model, plan: Plan, progress: Progress, *,
         progress("judging the attenuation of cells")
         leap = with_flags(model, plan.grid, leap, plan.tolerance)
     parameters = {"method": "direct", "doublings": doublings}
-    return PhaseMap(body, model, plan.grid, (leap,), UNMEASURED, None, parameters)
+    return PhaseMap(body, model, plan.grid, (leap,), parameters=parameters)
 
 
 def _traced(
@@ -111,8 +103,8 @@ def _traced(
     matrices = np.empty((len(nodes) if carry_jacobi else 0, 4))
     curvatures = np.empty((len(nodes) if carry_jacobi and curved else 0, NODES))
     steps = 1
-    for first in range(0, len(nodes), CHUNK):
-        part = slice(first, first + CHUNK)
+    for first in range(0, len(nodes), 65_536):
+        part = slice(first, first + 65_536)
         states = model.states(nodes[part])
         if carry_jacobi:
             states = pack(states[:, :3], states[:, 3:], jacobi=True)
@@ -149,12 +141,12 @@ def build_tower(body: Surface, grid: Grid, time_step: float, base: int, stages: 
     for level in range(stages + 1):
         if level:
             progress(f"level {level} of {stages}")
-            reached = PhaseMap(body, model, grid, tuple(leaps), UNMEASURED).leap(states, base)[:, None]
+            reached = PhaseMap(body, model, grid, tuple(leaps)).leap(states, base)[:, None]
         now = time_step * base**level
         values = model.displacement(nodes, reached, np.array([now]))
         leaps.append(_leap((values, reached[:, 0, 6:], np.empty((0, NODES))), grid, now, model))
     parameters = {"method": "tower", "time_step": time_step, "stages": stages, "base": base}
-    return PhaseMap(body, model, grid, tuple(leaps), UNMEASURED, None, parameters)
+    return PhaseMap(body, model, grid, tuple(leaps), parameters=parameters)
 
 
 def _leap(
@@ -177,7 +169,7 @@ def _leap(
     if whole and len(curvatures) and isinstance(model, CompiledModel):
         lanes = packed_lanes(model, values, matrices, curvatures, time)
     if lanes is not None:
-        matrices, matrix = lanes, lanes.mean(axis=0) if apart else np.zeros(PACKED)
+        matrices, matrix = lanes, lanes.mean(axis=0) if apart else np.zeros(lanes.shape[1])
     if model.name == "octant":
         # these change sign with the mirrors
         centre[1:3] = 0.0
@@ -196,8 +188,11 @@ def _leap(
     return Leap(time, state, centre, jacobi, matrix, fitted(curvatures), flagged)
 
 
-def measure(flow: PhaseMap, *, samples: int = SAMPLES, rng: np.random.Generator | None = None) -> ErrorEstimate:
-    """Error of one g_T0 against `trace` at 1e-12, over random points of T1Q (seed 0 without ``rng``)."""
+def measure(flow: PhaseMap, *, samples: int = 2000, rng: np.random.Generator | None = None) -> ErrorEstimate:
+    """Error of one g_T0 against `trace` at 1e-12, over random points of T1Q (seed 0 without ``rng``).
+
+    One ray in a hundred may carry most of the error.
+    """
     rays = Reference(flow.body, np.array([flow.horizon]), flow.horizon / 8, 1e-12, rng)
     errors = rays.errors(flow, 0, samples)[:, 0]
     return ErrorEstimate(float(np.sqrt(np.mean(errors**2))), float(errors.max()), samples)
@@ -207,7 +202,7 @@ def with_errors(
     flow: PhaseMap,
     length: float | None = None,
     *,
-    samples: int = SAMPLES,
+    samples: int = 2000,
     rtol: float = 1e-12,
     most: int = 1,
     known: "dict[Any, Reference] | None" = None,
@@ -279,6 +274,6 @@ class Reference:
 def require_checked(body: Surface) -> None:
     """Raise what `check_surface` finds, once a body."""
     name = fingerprint(body)
-    if name not in _CHECKED:
+    if name not in _checked:
         check_surface(body).require()
-        _CHECKED.add(name)
+        _checked.add(name)

@@ -14,11 +14,11 @@ from creeping.errors import CreepingError, StoredMapError
 from creeping.geodesics.integrator import ErrorEstimate
 from creeping.geometry.arguments import checked_body, folder_path
 from creeping.geometry.surface import Surface, fingerprint
-from creeping.kernels.private_cache import private_folder, require_private
-from creeping.phaseflow.coordinates.base import Model, model_of
-from creeping.phaseflow.coordinates.rotation import CompiledModel
-from creeping.phaseflow.phase_map import ErrorGrowth, PhaseMap
-from creeping.phaseflow.splines import PACKED, Grid, Leap
+from creeping.kernels.cache import private_folder, require_private
+from creeping.phaseflow.coordinates import Model, model_of
+from creeping.phaseflow.phase_map import TABLES, ErrorGrowth, PhaseMap
+from creeping.phaseflow.rotation import CompiledModel
+from creeping.phaseflow.splines import Grid, Leap
 from creeping.storage.folder import SCHEMA, content_digest, open_array, read_manifest
 
 
@@ -74,12 +74,9 @@ def load_phase_map(folder: str | Path, body: Surface) -> PhaseMap:
         leaps = tuple(
             Leap(
                 float(time),
-                open_array(folder, f"state-{k}.npy", content),
-                np.array([float(value) for value in content["centres"][k]]),
-                open_array(folder, f"jacobi-{k}.npy", content),
-                np.array([float(value) for value in content["matrices"][k]]),
-                open_array(folder, f"curvature-{k}.npy", content),
-                open_array(folder, f"flagged-{k}.npy", content),
+                centre=np.array([float(value) for value in content["centres"][k]]),
+                matrix=np.array([float(value) for value in content["matrices"][k]]),
+                **{name: open_array(folder, f"{name}-{k}.npy", content) for name in TABLES},
             )
             for k, time in enumerate(content["times"])
         )
@@ -119,7 +116,7 @@ def _check_shapes(folder: Path, grid: Grid, leaps: tuple[Leap, ...], model: Mode
         fits &= leap.centre.shape == (model.lanes,)
         fits &= leap.curvature.shape in ((*whole, 8), (0, *grid.sides, 8)) and leap.curvature.dtype == leap.state.dtype
         packed = leap.is_packed and leap.has_curvature and isinstance(model, CompiledModel)
-        shapes = ((*whole, PACKED),) if packed else ((*whole, 4), (0, *grid.sides, 4))
+        shapes = ((*whole, 8),) if packed else ((*whole, 4), (0, *grid.sides, 4))
         fits &= leap.jacobi.shape in shapes and leap.jacobi.dtype == leap.state.dtype
         fits &= leap.matrix.shape == leap.jacobi.shape[4:]
         fits &= leap.flagged.shape == (whole if packed else (0, *grid.sides)) and leap.flagged.dtype == np.uint8
@@ -132,11 +129,6 @@ def cached_place(body: Surface, key: dict[str, Any], folder: bool | str | Path) 
     root = cache_folder() if folder is True else Path(str(folder))
     digest = content_digest({"schema": SCHEMA, "version": __version__, "body": fingerprint(body), **key})
     return root / f"{type(body).__name__.lower()}-{digest[:24]}"
-
-
-def is_cached(body: Surface, key: dict[str, Any], *, folder: bool | str | Path) -> bool:
-    """Whether a map of the body with these parameters is in the cache."""
-    return cached_place(body, key, folder).exists()
 
 
 def cached_phase_map(

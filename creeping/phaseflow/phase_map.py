@@ -1,7 +1,7 @@
 """The phase map g_T0 of a body's geodesic flow, and the composition of maps to any time.
 
 A point (x, p) of T1Q has coordinates (chart, u, v, angle). A map stores, as splines in (u, v, angle), the displacement
-of the time-t flow in the coordinates of its model (`models`), its Jacobi matrix and the curvatures along it;
+of the time-t flow in the coordinates of its model (`coordinates`), its Jacobi matrix and the curvatures along it;
 g_(m T0) = g_T0 o ... o g_T0 [YC06a, Algorithm 2]. The remainder of a time below T0 is covered by the shorter maps of
 the tower, if there is one, and below those by the order-8 integrator.
 """
@@ -18,19 +18,16 @@ from creeping._typing import Any, ArrayLike, FloatArray, IntArray
 from creeping._version import __version__
 from creeping.errors import InvalidInputError
 from creeping.geodesics.attenuation import with_attenuation
-from creeping.geodesics.bundle import bundle_states
 from creeping.geodesics.integrator import ErrorEstimate, as_times, trace_states
-from creeping.geodesics.states import DETACHMENT, checked_states, unpack
+from creeping.geodesics.states import DETACHMENT, bundle_states, checked_states, unpack
 from creeping.geometry.arguments import folder_path, positive_number, real_number, whole_number
 from creeping.geometry.surface import Surface, fingerprint
-from creeping.phaseflow.coordinates.base import Model
+from creeping.phaseflow.coordinates import Model
 from creeping.phaseflow.splines import Grid, Leap
 from creeping.storage.folder import write_folder
 
-SHORT = 0.5
-"""Share of the longest time up to which traces from the ends of leaps carry the attenuation, and leaps the rest."""
-MOST_LEAPS = 1e5
-"""Leaps of the horizon that a ray may take: some seconds for a thousand rays."""
+TABLES = "state", "jacobi", "curvature", "flagged"
+"""Tables of a leap that are stored as files."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +105,7 @@ class PhaseMap(Drawn):
     leaps : tuple of Leap
         Maps by ascending time; the last is g_T0. Only ``method="tower"`` has more than one.
     error : ErrorEstimate
-        Of one g_T0, measured when the map was built.
+        Of one g_T0, measured when the map was built; NaN before.
     growth : ErrorGrowth or None
         Error as a function of ray length.
     parameters : dict
@@ -129,7 +126,7 @@ class PhaseMap(Drawn):
     model: Model
     grid: Grid
     leaps: tuple[Leap, ...]
-    error: ErrorEstimate
+    error: ErrorEstimate = field(default_factory=lambda: ErrorEstimate(float("nan"), float("nan"), 0))
     growth: ErrorGrowth | None = None
     parameters: dict[str, Any] = field(default_factory=dict)
 
@@ -232,10 +229,11 @@ class PhaseMap(Drawn):
         attenuates = states.shape[1] > 10
         if attenuates and not self._leaps_serve(times):
             return with_attenuation(self.body, states, times, rtol=self._rtol)
-        if len(times) and times.max() > MOST_LEAPS * self.horizon:
+        # a thousand rays take some seconds for so many leaps
+        if len(times) and times.max() > 1e5 * self.horizon:
             raise InvalidInputError(
                 f"times up to {times.max():.3g} take {times.max() / self.horizon:.2g} leaps of {self.horizon:.3g}, "
-                f"more than {MOST_LEAPS:g}; give shorter ones"
+                "more than 100000; give shorter ones"
             )
         # a time that misses a multiple of the horizon by rounding is that multiple
         whole = np.floor(times / self.horizon * (1 + 4e-16) + 1e-12).astype(np.int64)
@@ -267,7 +265,7 @@ class PhaseMap(Drawn):
             return False
         whole = np.floor(times / self.horizon * (1 + 4e-16) + 1e-12)
         traced = sum(float(np.max(times[whole == k] - k * self.horizon)) for k in np.unique(whole))
-        return bool(traced <= SHORT * times.max())
+        return bool(traced <= 0.5 * times.max())
 
     def _remainder(self, states: FloatArray, times: FloatArray, begun: float) -> FloatArray:
         """Advance by times below the horizon from a time ``begun``: down the tower, then by direct integration."""
@@ -340,8 +338,7 @@ class PhaseMap(Drawn):
             "growth": self.growth and [self.growth.lengths, self.growth.rms, self.growth.max, [self.growth.bound]],
             "parameters": self.parameters,
         }
-        states = {f"state-{k}.npy": leap.state for k, leap in enumerate(self.leaps)}
-        jacobis = {f"jacobi-{k}.npy": leap.jacobi for k, leap in enumerate(self.leaps)}
-        curvatures = {f"curvature-{k}.npy": leap.curvature for k, leap in enumerate(self.leaps)}
-        flagged = {f"flagged-{k}.npy": leap.flagged for k, leap in enumerate(self.leaps)}
-        return write_folder(folder, content, states | jacobis | curvatures | flagged)
+        leaps = enumerate(self.leaps)
+        return write_folder(
+            folder, content, {f"{name}-{k}.npy": getattr(leap, name) for k, leap in leaps for name in TABLES}
+        )

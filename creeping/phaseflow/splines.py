@@ -20,9 +20,6 @@ from creeping.geometry.surface import Surface
 MARGIN = 2
 """Nodes of a chart beyond each edge of its unit square: every point finds a chart two grid points from the edge."""
 
-PACKED = 8
-"""Lanes of a table that holds displacement, Jacobi matrix and attenuation."""
-
 
 @cache
 def interpolation_operator(n: int, degree: int, periodic: bool) -> FloatArray:
@@ -183,7 +180,7 @@ class Leap:
     @property
     def is_packed(self) -> bool:
         """Whether ``jacobi`` has the displacement and the attenuation too."""
-        return bool(self.jacobi.shape[-1] == PACKED)
+        return bool(self.jacobi.shape[-1] == 8)
 
     @property
     def has_jacobi(self) -> bool:

@@ -1,4 +1,6 @@
-"""Where rays end before the fan does: detached, at what a body calls not smooth, at its edges and tips.
+"""What becomes of rays: where they start, and where they end before the fan does.
+
+They end detached, at what a body calls not smooth, at its edges and tips.
 
 Also here: where the rays of one fan start: the launch points of the line, and further ones between them.
 
@@ -18,6 +20,7 @@ Also here: where rays come to a place at which the body (`Surface.non_smooth`) i
 Sources: Derivations, R4, R6 and F3.
 """
 
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -26,20 +29,47 @@ from creeping._typing import Any, FloatArray, IntArray
 from creeping.geodesics.states import CREASE, DETACHMENT, END, WHOLE, X
 from creeping.geometry.piecewise import is_piecewise, nearest_crease
 from creeping.geometry.surface import Surface, size
-from creeping.rays.status import RayStatus
 from creeping.shadow.attachment import Arc, LaunchPoints
 from creeping.shadow.line import ShadowLine
 
-OF_CREASE = {"edge": RayStatus.EDGE, "tip": RayStatus.TIP}
 
-FEW_RAYS, FEW = 4096, 32
-"""Rays that are enough for a line of several arcs to begin with, or so many for each in the mean: of many holes and
-fillets each has as many points as a body's only curve."""
+class RayStatus(IntEnum):
+    """Status of a ray: whether it was launched, and where it ended.
 
+    Examples
+    --------
+    >>> import creeping as cr
+    >>> cr.RayStatus.OK.name, int(cr.RayStatus.OK)
+    ('OK', 0)
+    """
+
+    OK = 0
+    DETACHED = 1
+    """kappa_n fell to 0 at ``RayFan.detachment``; the field ends there."""
+    OCCLUDED = 2
+    """Launched on request from a point that the incident wave does not reach."""
+    CONCAVE = 3
+    """Launched on request from a point where kappa_n(d) <= 0: no creeping ray."""
+    STALLED = 4
+    """The speed vanishes at the launch point, so the ray does not move and J is not defined (NaN)."""
+    NON_SMOOTH = 5
+    """Reached, at ``RayFan.detachment``, a region that the body declares non-smooth, or a point at which the geodesic
+    cannot be continued; the field ends there."""
+    EDGE = 6
+    """Reached an edge of the body at ``RayFan.detachment``; its contribution beyond is left out."""
+    TIP = 7
+    """Reached a tip of the body at ``RayFan.detachment``; its contribution beyond is left out."""
+
+
+AT_CREASES = (RayStatus.EDGE, RayStatus.TIP)
+"""Statuses of rays that end at a crease,"""
+ENDED = (RayStatus.DETACHED, RayStatus.NON_SMOOTH, *AT_CREASES)
+"""and of rays whose field ends at ``RayFan.detachment``."""
+FEW_RAYS = 4096
+"""Rays that are enough for a line of several arcs to begin with, or 32 for each in the mean: of many holes and fillets
+each has as many points as a body's only curve."""
 NON_SMOOTH_SPACING = 0.005
-"""Spacing at which rays are looked at for non-smooth regions, in sizes of the body,"""
-NON_SMOOTH_BLOCK = 64
-"""so many rays at a time."""
+"""Spacing at which rays are looked at for non-smooth regions, in sizes of the body."""
 
 
 def ends_of(
@@ -65,9 +95,7 @@ def ends_of(
     if path.shape[-1] > WHOLE:
         end = path[:, -1, END]
         # the last is of number -1: a ray that could not go on, far from any crease
-        kinds = np.array(
-            [*(OF_CREASE.get(crease.kind, RayStatus.EDGE) for crease in body.creases), RayStatus.NON_SMOOTH]
-        )
+        kinds = np.array([*(_of_crease(crease, RayStatus.EDGE) for crease in body.creases), RayStatus.NON_SMOOTH])
         status = np.where(creeping & (end < first), kinds[path[:, -1, CREASE].astype(np.int64)], status)
         first = np.minimum(first, end)
     if hasattr(body, "non_smooth"):
@@ -81,6 +109,11 @@ def ends_of(
     return status, first
 
 
+def _of_crease(crease: Any, other: RayStatus) -> RayStatus:
+    """Status of rays that end at an edge or tip, or the other one."""
+    return {"edge": RayStatus.EDGE, "tip": RayStatus.TIP}.get(crease.kind, other)
+
+
 def _refused(body: Any, path: FloatArray, times: FloatArray, met: FloatArray) -> IntArray:
     """Status (rays,) of rays that come at times ``met`` to what is not smooth enough: a body with creases says why."""
     out = np.full(len(met), int(RayStatus.NON_SMOOTH))
@@ -90,7 +123,7 @@ def _refused(body: Any, path: FloatArray, times: FloatArray, met: FloatArray) ->
     places = np.array([[np.interp(met[row], times, path[row, :, axis]) for axis in range(3)] for row in rows])
     crease, _ = nearest_crease(body, places.reshape(-1, 3))
     for row, number in zip(rows, crease, strict=True):
-        out[row] = OF_CREASE.get(body.creases[number].kind, RayStatus.NON_SMOOTH)
+        out[row] = _of_crease(body.creases[number], RayStatus.NON_SMOOTH)
     return out
 
 
@@ -126,7 +159,7 @@ class Starts(NamedTuple):
             shares = [(a.end - a.start) / line.curves[a.curve].length * len(line.curves[a.curve].points) for a in arcs]
             n_rays = sum(max(1, round(share)) for share in shares)
             if len(arcs) > 1:
-                n_rays = min(n_rays, max(FEW_RAYS, FEW * len(arcs)))
+                n_rays = min(n_rays, max(FEW_RAYS, 32 * len(arcs)))
         launch = line.launch_points(max(n_rays, len(arcs)), launch_from)
         there = np.flatnonzero(launch.there[0])
         _, arc = np.unique(launch.arc_index[0, there], return_inverse=True)
@@ -199,15 +232,9 @@ class Starts(NamedTuple):
     def launch_points(self, line: ShadowLine) -> LaunchPoints:
         """As launch points of one incidence."""
         curve = np.array([self.arcs[k].curve for k in self.arc], dtype=np.int64)
-        rows: tuple[Any, ...] = (
-            self.points,
-            self.arclength,
-            curve,
-            self.arc.astype(float),
-            self.spacing,
-            np.array([self.arcs[k].closed for k in self.arc], dtype=float),
-            self.state,
-        )
+        closed = np.array([self.arcs[k].closed for k in self.arc], dtype=float)
+        arc = self.arc.astype(float)
+        rows: tuple[Any, ...] = self.points, self.arclength, curve, arc, self.spacing, closed, self.state
         return LaunchPoints(line.wave[None], *(row[None] for row in rows))
 
 
@@ -258,11 +285,11 @@ def non_smooth_from(body: Surface, points: FloatArray, times: FloatArray) -> Flo
     fine = np.interp(np.arange((len(times) - 1) * parts + 1) / parts, np.arange(len(times)), times)
     share = (np.arange(parts) / parts)[:, None]
     found = np.full(len(points), np.inf)
-    for first in range(0, len(points), NON_SMOOTH_BLOCK):
-        path = points[first : first + NON_SMOOTH_BLOCK, :, None]
+    for first in range(0, len(points), 64):
+        path = points[first : first + 64, :, None]
         dense = path[:, :-1] + share * (path[:, 1:] - path[:, :-1])
         dense = np.concatenate([dense.reshape(len(path), -1, 3), path[:, -1]], axis=1)
         met = non_smooth(dense)
         before = np.maximum(np.argmax(met, axis=1) - 1, 0)
-        found[first : first + NON_SMOOTH_BLOCK] = np.where(met.any(axis=1), fine[before], np.inf)
+        found[first : first + 64] = np.where(met.any(axis=1), fine[before], np.inf)
     return found

@@ -24,8 +24,7 @@ from creeping.errors import InvalidInputError
 from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.equations import points_of_charts
 from creeping.geodesics.integrator import ErrorEstimate, trace_states
-from creeping.geodesics.piece_trace import Passages
-from creeping.geodesics.pieces import passages, trace_pieces
+from creeping.geodesics.pieces import Passages, passages, trace_pieces
 from creeping.geodesics.states import ATTENUATION, P, X, known_steps, pack, whole_lanes
 from creeping.geometry.arguments import flag, one_of, real_number, whole_number
 from creeping.geometry.checks import unit_of
@@ -33,19 +32,13 @@ from creeping.geometry.curvature import gaussian_curvature, normal_curvature
 from creeping.geometry.evaluators import speed_of, speed_values
 from creeping.geometry.piecewise import has_edges, is_piecewise
 from creeping.geometry.surface import Surface, fingerprint, memo, size
-from creeping.rays.ends import FEW_RAYS, Losses, Starts, ends_of, outline_share
+from creeping.rays.ends import AT_CREASES, ENDED, FEW_RAYS, Losses, RayStatus, Starts, ends_of, outline_share
 from creeping.rays.reach import AUTO, HARD_DECAY, IN_RANGE, ray_length
-from creeping.rays.status import AT_CREASES, LAUNCHED, LINE_STATUS, RayStatus
 from creeping.rays.transport import Flow, carried, checked_flow, spread, zeros_passed
 from creeping.shadow.attachment import LaunchPoints, line_tangents
 from creeping.shadow.line import ShadowLine, checked_launch_from
-from creeping.shadow.status import NO_RAY
+from creeping.shadow.status import ATTACHED, CONCAVE, NO_RAY, OCCLUDED
 from creeping.storage.memory import within_budget
-
-MAX_RAYS, GROWTH, HALVED = 200_000, 32, 4
-"""Rays beyond which refinement stops, also in units of those asked for, unless few; halvings of gaps at edges."""
-CHECKED_RAYS = 16
-"""Rays that are traced directly to measure the error of a fan."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -149,7 +142,7 @@ class RayFan(DrawnOnBody):
     @property
     def launched(self) -> BoolArray:
         """Whether the incident wave launched each ray, even if the ray ended early: (rays,)."""
-        return np.isin(self.status, LAUNCHED)
+        return np.isin(self.status, (RayStatus.OK, *ENDED))
 
     @cached_property
     def crossings(self) -> Passages:
@@ -172,7 +165,14 @@ class RayFan(DrawnOnBody):
 
     def losses(self, wavenumber: float | None = None) -> Losses:
         """Shares of shadow line, rays and outline lost to edges and tips; ``wavenumber`` is that of `launch`."""
-        return Losses(self.line.edge_share, _of_rays(self, wavenumber), outline_share(self.line))
+        launched, lost = self.launched, 0.0
+        ended = launched & np.isin(self.status, AT_CREASES)
+        if np.any(ended):
+            k = IN_RANGE * float(np.median(self.curvature[launched, 0])) if wavenumber is None else wavenumber
+            # a ray that has ended stays where it is, and so does its attenuation
+            left = np.exp(-np.cbrt(max(k, 0.0) / 2) * self.attenuation[ended, -1] * HARD_DECAY)
+            lost = float(np.sum(self.spacing[ended] * left) / np.sum(self.spacing[launched]))
+        return Losses(self.line.edge_share, lost, outline_share(self.line))
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{count} {name}" for name, count in self.status_counts.items())
@@ -268,7 +268,8 @@ def launch(
     times = np.linspace(0.0, length, steps + 1)
     starts = Starts.of(line, n_rays, launch_from)
     states = _carry(flow, line, starts, times)
-    most, passes = min(MAX_RAYS, max(GROWTH * len(starts.arc), FEW_RAYS)), HALVED if has_edges(body) else MAX_RAYS
+    # next to edges gaps are halved four times
+    most, passes = min(200_000, max(32 * len(starts.arc), FEW_RAYS)), 4 if has_edges(body) else 200_000
     for _ in range(0 if np.isinf(gap) else passes):
         arc, position = starts.parting(states[..., X], gap, known_steps(states, times))
         if not len(arc) or len(starts.arc) + len(arc) > most:
@@ -332,7 +333,9 @@ def ray_arrays(body: Surface, launch: LaunchPoints, states: FloatArray, times: F
     directions = launch.headings[there]
     tangents = None if speed_of(body) is None else line_tangents(body, points, directions)
     J, rate, stalled = spread(body, points, tangents, directions, launch.openings[there], path)
-    begun = np.array([LINE_STATUS[k] for k in sorted(LINE_STATUS)])[launch.state[there].astype(int)]
+    begun = np.zeros(3, dtype=np.int64)
+    begun[[ATTACHED, OCCLUDED, CONCAVE]] = RayStatus.OK, RayStatus.OCCLUDED, RayStatus.CONCAVE
+    begun = begun[launch.state[there].astype(int)]
     status, first = ends_of(body, points, path, times, begun)
     status[stalled] = RayStatus.STALLED
 
@@ -387,7 +390,7 @@ def end_error(fan: RayFan) -> ErrorEstimate:
     """Error of (x, p) at the end of a fan, against direct integration of evenly chosen rays from their start."""
     if not len(fan.points):
         return ErrorEstimate(0.0, 0.0, 0)
-    chosen = np.unique(np.linspace(0, len(fan.points) - 1, CHECKED_RAYS).astype(int))
+    chosen = np.unique(np.linspace(0, len(fan.points) - 1, 16).astype(int))
     first = pack(fan.points[chosen, 0], fan.directions[chosen, 0])
     # a thousandth of what is to be measured
     rms = np.nan if fan.flow.error is None else fan.flow.error.rms
@@ -396,14 +399,3 @@ def end_error(fan: RayFan) -> ErrorEstimate:
     exact = trace(fan.body, first, np.array([fan.length]), rtol=rtol)[:, 0]
     error = np.linalg.norm(np.concatenate([fan.points[chosen, -1], fan.directions[chosen, -1]], axis=1) - exact, axis=1)
     return ErrorEstimate(float(np.sqrt(np.mean(error**2))), float(error.max()), len(chosen))
-
-
-def _of_rays(fan: RayFan, wavenumber: float | None) -> float:
-    launched = fan.launched
-    ended = launched & np.isin(fan.status, AT_CREASES)
-    if not np.any(ended):
-        return 0.0
-    k = IN_RANGE * float(np.median(fan.curvature[launched, 0])) if wavenumber is None else wavenumber
-    # a ray that has ended stays where it is, and so does its attenuation
-    left = np.exp(-np.cbrt(max(k, 0.0) / 2) * fan.attenuation[ended, -1] * HARD_DECAY)
-    return float(np.sum(fan.spacing[ended] * left) / np.sum(fan.spacing[launched]))

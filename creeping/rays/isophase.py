@@ -29,14 +29,8 @@ from creeping.geometry.checks import UNKNOWN, unit_of
 from creeping.geometry.evaluators import speed_of, speed_values
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import project
+from creeping.rays.ends import AT_CREASES
 from creeping.rays.fan import RayFan
-from creeping.rays.status import AT_CREASES
-
-MOST_LEVELS = 100_000
-"""Levels of one call."""
-
-POLE_JUMP = np.pi / 2
-"""Step of an angle, seams apart, that only the passage of a pole makes on a well sampled curve."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -141,12 +135,11 @@ def iso_phase_curves(
     values = np.atleast_1d(real_array(levels, "levels"))
     if values.ndim != 1 or not np.all(np.isfinite(values)):
         raise InvalidInputError("levels must be finite numbers, one or a list of them")
-    if len(values) > MOST_LEVELS:
-        raise InvalidInputError(f"{len(values)} levels are more than {MOST_LEVELS}; ask for fewer")
+    if len(values) > 100_000:
+        raise InvalidInputError(f"{len(values)} levels are more than 100000; ask for fewer")
     beyond_detachment = flag(beyond_detachment, "beyond_detachment")
     if not len(fan.points):
         return []
-    hermite = _Hermite(fan)
     offset = fan.eikonal[:, 0] - fan.travel_time[0] if of == "eikonal" else np.zeros(len(fan.points))
     last = _whole_steps(fan)
     if not beyond_detachment:
@@ -159,7 +152,8 @@ def iso_phase_curves(
     if not pieces:
         return []
     # all points in one call: a level has few
-    points = hermite.at(np.concatenate([run for _, run, _, _ in pieces]), np.concatenate([t for _, _, t, _ in pieces]))
+    rays, times = (np.concatenate([piece[k] for piece in pieces]) for k in (1, 2))
+    points = _points_at(fan, rays, times)
     parameters = fan.body.parameters(points)
     ends = np.cumsum([len(run) for _, run, _, _ in pieces])[:-1]
     parts = zip(pieces, np.split(points, ends), np.split(parameters, ends), strict=True)
@@ -200,34 +194,25 @@ def _runs(fan: RayFan, met: IntArray) -> Iterable[tuple[IntArray, bool]]:
                 yield group, False
 
 
-class _Hermite:
-    """Quintic interpolation of the rays in time."""
-
-    def __init__(self, fan: RayFan) -> None:
-        self.fan = fan
-        c = speed_values(fan.body, fan.points)[..., None]
-        velocity, turning = vector_field(fan.body, fan.points, fan.directions)
-        self.velocity = velocity
-        self.acceleration = c * turning
-        speed = speed_of(fan.body)
-        if speed is not None:
-            # x'' = (c p)' with c' = grad c.x'
-            self.acceleration += np.sum(speed.gradient(fan.points) * velocity, axis=-1, keepdims=True) * fan.directions
-
-    def at(self, rays: IntArray, times: FloatArray) -> FloatArray:
-        """Points of the rays at one time each: (n,), (n,) -> (n, 3)."""
-        steps = self.fan.travel_time
-        k = np.clip(np.searchsorted(steps, times, side="right") - 1, 0, len(steps) - 2)
-        h = (steps[k + 1] - steps[k])[:, None]
-        s = (times - steps[k])[:, None] / h
-        cube = s**3
-        end = cube * (10 - 15 * s + 6 * s**2)
-        points = (1 - end) * self.fan.points[rays, k] + end * self.fan.points[rays, k + 1]
-        points += h * (s - cube * (6 - 8 * s + 3 * s**2)) * self.velocity[rays, k]
-        points += h * cube * (-4 + 7 * s - 3 * s**2) * self.velocity[rays, k + 1]
-        points += h**2 * 0.5 * (s**2 - cube * (3 - 3 * s + s**2)) * self.acceleration[rays, k]
-        points += h**2 * 0.5 * cube * (1 - 2 * s + s**2) * self.acceleration[rays, k + 1]
-        return project(self.fan.body, points)
+def _points_at(fan: RayFan, rays: IntArray, times: FloatArray) -> FloatArray:
+    """Points of the rays at one time each, by quintics between steps: (n,), (n,) -> (n, 3)."""
+    velocity, turning = vector_field(fan.body, fan.points, fan.directions)
+    acceleration, speed = speed_values(fan.body, fan.points)[..., None] * turning, speed_of(fan.body)
+    if speed is not None:
+        # x'' = (c p)' with c' = grad c.x'
+        acceleration += np.sum(speed.gradient(fan.points) * velocity, axis=-1, keepdims=True) * fan.directions
+    steps = fan.travel_time
+    k = np.clip(np.searchsorted(steps, times, side="right") - 1, 0, len(steps) - 2)
+    h = (steps[k + 1] - steps[k])[:, None]
+    s = (times - steps[k])[:, None] / h
+    cube = s**3
+    end = cube * (10 - 15 * s + 6 * s**2)
+    points = (1 - end) * fan.points[rays, k] + end * fan.points[rays, k + 1]
+    points += h * (s - cube * (6 - 8 * s + 3 * s**2)) * velocity[rays, k]
+    points += h * cube * (-4 + 7 * s - 3 * s**2) * velocity[rays, k + 1]
+    points += h**2 * 0.5 * (s**2 - cube * (3 - 3 * s + s**2)) * acceleration[rays, k]
+    points += h**2 * 0.5 * cube * (1 - 2 * s + s**2) * acceleration[rays, k + 1]
+    return project(fan.body, points)
 
 
 def split_at_seam(parameters: FloatArray, *, closed: bool) -> list[FloatArray]:
@@ -246,14 +231,16 @@ def split_at_seam(parameters: FloatArray, *, closed: bool) -> list[FloatArray]:
         Pieces in order; no step of a piece exceeds pi/2.
     """
     path = np.concatenate([parameters, parameters[:1]]) if closed else parameters
-    if np.all(np.abs(np.diff(path, axis=0)) <= POLE_JUMP):
+    # a longer step, seams apart, only the passage of a pole makes on a well sampled curve
+    longest = np.pi / 2
+    if np.all(np.abs(np.diff(path, axis=0)) <= longest):
         return [np.array(path)] if len(path) > 1 else []
     pieces: list[FloatArray] = []
     current = [path[0]]
     for after in path[1:]:
         jump = after - current[-1]
         short = jump - 2 * np.pi * np.round(jump / (2 * np.pi))
-        if np.any(np.abs(short) > POLE_JUMP):
+        if np.any(np.abs(short) > longest):
             pieces.append(np.array(current))
             current = [after]
             continue

@@ -24,17 +24,13 @@ from creeping.storage.memory import within_budget
 
 RAYS = 96
 """Rays of a fan, at least;"""
-WIDEST, MOST_RAYS = 0.2, 1536
-"""neighbours part by no more than this, in body sizes, unless there are so many rays."""
+WIDEST = 0.2
+"""neighbours part by no more than this, in body sizes, unless there are 1536 rays."""
 TURN = 0.2
 """Largest angle by which a ray turns in one step."""
 RTOL = 1e-9
 """Relative tolerance of rays. Twice as many rays, half of the gaps and steps, and a tenth of the tolerance find the
 same geodesics (``tests/rays/test_port_rays.py``)."""
-NODES = 400_000
-"""Nodes of fans that are held at once: 60 MB."""
-SAME = 1e-4
-"""Distance of two passages, in rays and in steps, below which they are one found twice."""
 PER_PAIR = 3
 """Geodesics for which there is place at first, for each pair of ports."""
 
@@ -155,7 +151,8 @@ def rays_between(
     counts = _ray_counts(body, ports[:senders], normals[:senders], times)
     for rays in np.unique(counts):
         mine = np.flatnonzero(counts == rays)
-        some = max(1, NODES // (int(rays) * len(times)))
+        # 60 MB of nodes of fans are held at once
+        some = max(1, 400_000 // (int(rays) * len(times)))
         for begin in range(0, len(mine), some):
             numbers = mine[begin : begin + some]
             states = traced_fans(body, ports[numbers], normals[numbers], int(rays), times)
@@ -178,7 +175,7 @@ def _ray_counts(body: Surface, ports: FloatArray, normals: FloatArray, times: Fl
     widest = np.max(np.abs(states[..., M12]), axis=(1, 2), where=creeps, initial=0.0)
     asked = 2 * np.pi * widest / (WIDEST * size(body))
     factor = 2.0 ** np.ceil(np.log2(np.maximum(asked / RAYS, 1.0)))
-    return np.asarray(np.minimum(RAYS * factor, MOST_RAYS), dtype=np.int64)
+    return np.asarray(np.minimum(RAYS * factor, 1536), dtype=np.int64)
 
 
 def traced_fans(body: Surface, ports: FloatArray, normals: FloatArray, rays: int, times: FloatArray) -> FloatArray:
@@ -202,7 +199,7 @@ def _passages(
     folds: FloatArray,
 ) -> tuple[IntArray, FloatArray]:
     """Ports of higher numbers that one fan passes (m,), and what is known there; fills ``folds`` (2, n)."""
-    from creeping.rays.kernels.port_fans import AHEAD, BEHIND, LANES, START, passed, port_fan
+    from creeping.rays.kernels.port_fans import BEHIND, LANES, START, passed, port_fan
     from creeping.rays.kernels.quantities import polynomial_matrix
 
     rays, count = states.shape[:2]
@@ -211,7 +208,7 @@ def _passages(
         port_fan(parts.level, parts.level_parameters, step, size(body), 1.0, states, lanes, last)
     axis = int(np.argmax(np.ptp(ports, axis=0)))
     order = np.argsort(ports[:, axis], kind="stable")
-    matrices = polynomial_matrix(AHEAD), np.pad(polynomial_matrix(2), ((0, 2), (1, 1)))
+    matrices = polynomial_matrix(BEHIND + 1), np.pad(polynomial_matrix(2), ((0, 2), (1, 1)))
     most, ports = PER_PAIR * len(ports) + 64, np.ascontiguousarray(ports)
     while True:
         owner, found = np.empty(most, dtype=np.int64), np.empty((most, LANES + START + 3))
@@ -223,7 +220,7 @@ def _passages(
 
     def alike(i: IntArray, j: IntArray) -> BoolArray:
         turn, later = np.abs(found[i, :2] - found[j, :2]).T
-        return np.asarray((np.minimum(turn, rays - turn) < SAME) & (later < SAME))
+        return np.asarray((np.minimum(turn, rays - turn) < 1e-4) & (later < 1e-4))
 
     kept = first_of_equals(owner, alike)
     return owner[kept], found[kept]

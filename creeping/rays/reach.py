@@ -27,8 +27,6 @@ from creeping.rays.transport import carried
 from creeping.shadow.attachment import LaunchPoints
 from creeping.shadow.line import ShadowLine, shadow_lines
 
-LEAST_SIZES, MOST_SIZES = 1e-6, 1e5
-"""Length of rays that can be meant, in body sizes: beyond, phases have no digits left."""
 AUTO: Final = "auto"
 HARD_DECAY = 1.0187929716474710 * float(np.sin(np.pi / 3))
 """Im τ of the slowest mode, that of the hard boundary: α'₁ is the first zero of Ai' [AS64, table 10.13]."""
@@ -36,10 +34,8 @@ DECAY, SPARED, LONGEST = 7.5, 0.1, 4.0
 """Exponent by which the wave falls, share of the rays that need not, and body sizes after which it does not matter."""
 IN_RANGE = 10.0
 """k rho from which the expansions serve; at it, rho the median at the launch points, is k where none is given."""
-WEIGHTED = 1.5
-"""Body sizes that the rays of a weighted body cross, at its median speed."""
-TRIALS, SAMPLES, RTOL = 64, 64, 1e-6
-"""Trial rays of an incidence, their equal steps, and the tolerance of each: lengths are rounded to GRAIN."""
+TRIALS = 64
+"""Trial rays of an incidence."""
 GRAIN = 0.01
 """Lengths are multiples of this, in body sizes, so that machines that round differently agree."""
 INCIDENCES = 12
@@ -101,13 +97,11 @@ def asked_length(body: Surface, length: float) -> float:
     Raises
     ------
     InvalidInputError
-        If it is not from `LEAST_SIZES` to `MOST_SIZES` body sizes, or times of a weighted body that take as long.
+        If it is not from 1e-6 to 1e5 body sizes, beyond which phases have no digits left, or times of a weighted body
+        that take as long.
     """
     unit = size(body) if speed_of(body) is None else weighted_length(body)
-    for word, wrong, end in (
-        ("more", length > MOST_SIZES * unit, MOST_SIZES),
-        ("less", length < LEAST_SIZES * unit, LEAST_SIZES),
-    ):
+    for word, wrong, end in (("more", length > 1e5 * unit, 1e5), ("less", length < 1e-6 * unit, 1e-6)):
         if wrong:
             raise InvalidInputError(f"length = {length:g} is {word} than {end:g} sizes of the body; give another")
     return length
@@ -153,15 +147,15 @@ def decayed_lengths(
 ) -> FloatArray:
     """Lengths (n,), L, at which waves of n incidences have died away; LONGEST body sizes where no ray is launched."""
     most, there = LONGEST * size(body), launch.there
-    times: FloatArray = np.linspace(0.0, most, SAMPLES + 1)
+    times: FloatArray = np.linspace(0.0, most, 65)
 
     def traced() -> tuple[FloatArray, FloatArray]:
         starts = pack(launch.points[there], launch.headings[there])
         curvature = np.full(there.shape, np.nan)
         curvature[there] = curvature_values(body, starts)
-        return curvature, carried(DirectFlow(body, rtol=RTOL), launch, times, components=whole_lanes(body))
+        return curvature, carried(DirectFlow(body, rtol=1e-6), launch, times, components=whole_lanes(body))
 
-    # the same for all wavenumbers
+    # the same for all wavenumbers; lengths are rounded to GRAIN
     curvature, states = memo(launch, "trial rays", traced)
     k = None if wavenumber is None else _positive("wavenumber", wavenumber)
     found = np.full(len(there), most)
@@ -185,7 +179,7 @@ def weighted_length(body: Surface) -> float:
     """Travel time in which the rays of a weighted body cross 1.5 body sizes at its median speed."""
     speeds = speed_values(body, points_of_charts(body))
     moving = speeds[speeds > 0]
-    return WEIGHTED * size(body) / (float(np.median(moving)) if len(moving) else 1.0)
+    return 1.5 * size(body) / (float(np.median(moving)) if len(moving) else 1.0)
 
 
 def _positive(name: str, value: float | str, alternative: str = "") -> float:

@@ -25,10 +25,6 @@ from creeping.rays.quantities import RayPoints
 from creeping.rays.strips import Strip, gather
 from creeping.shadow.attachment import occluded
 
-BLOCK = 4_000_000
-"""Values of a function on a strip for several observers that are held at once."""
-ALIKE = 1e-5
-"""Distance, in cells, up to which two solutions of an observer are one."""
 CLOSE = 1e-9
 """Residual at which a search ends, in radians or body sizes; splines of a coarse fan leave up to 1000 times that."""
 
@@ -175,7 +171,8 @@ def _seeds(
     n = normal(body, x)
     fields = [np.ascontiguousarray(v.T) for v in (x, n, np.cross(n, p), p)]
     found = [(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))]
-    block = max(1, BLOCK // max(1, len(x)))
+    # values of a function for several observers that are held at once
+    block = max(1, 4_000_000 // max(1, len(x)))
     for first in range(0, len(targets), block):
         f, g, ahead = functions(targets[first : first + block], *fields)
         row, ray, column = np.nonzero(_changes(f.reshape(-1, *shape)) & _changes(g.reshape(-1, *shape)))
@@ -210,7 +207,8 @@ def _newton(
     residual = np.full(len(row), np.inf)
     for _ in range(12):
         at = strip.at(sigma, s)
-        columns, gap = step(at, strip.slopes(sigma, s), targets[row])
+        slopes = strip.slopes(sigma, s)[:, :6], strip.slopes(sigma, s, 1)[:, :6]
+        columns, gap = step(at, slopes, targets[row])
         residual = np.linalg.norm(gap, axis=-1)
         if np.all(residual < CLOSE):
             break
@@ -240,7 +238,7 @@ def _newton(
         apart = np.abs(sigma[i] - sigma[j])
         if strip.closed:
             apart = np.minimum(apart, strip.period - apart)
-        return np.asarray((apart <= ALIKE * widths[0]) & (np.abs(s[i] - s[j]) <= ALIKE * widths[1]))
+        return np.asarray((apart <= 1e-5 * widths[0]) & (np.abs(s[i] - s[j]) <= 1e-5 * widths[1]))
 
     kept = first_of_equals(row, alike)
     return row[kept], sigma[kept], s[kept]

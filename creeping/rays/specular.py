@@ -28,21 +28,8 @@ from creeping.geometry.surface import Surface, normal, project, size
 from creeping.geometry.triangulation import Triangulation, triangulate
 from creeping.shadow.attachment import occluded
 
-CONVERGED = 1e-10
-"""Residual of the normal at a specular point."""
 FLAT = 1e-4
 """Determinant of L S + n n^T, L the body's size, over the square of its norm, below which a point counts as flat."""
-FLATTEST = 1e-8
-"""Least principal curvature, in inverse body sizes."""
-ALIKE = 1e-6
-"""Distance, in body sizes, below which two solutions are one."""
-
-SHARE = 0.05
-"""Longest sides of the triangles that seed the search, in body sizes."""
-INWARD = 1e-6
-"""Share by which their corners are drawn to their middles: at a tip there is no normal."""
-OUTWARD = 1e-7
-"""Distance from the body, in its sizes, at which it is asked whether anything is in the way."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +105,7 @@ def specular_points(
     matrix = np.stack([np.stack([along, mixed], axis=-1), np.stack([mixed, across], axis=-1)], axis=-2)
     principal, axes = np.linalg.eigh(matrix)
     # in flat regions the field is not finite: large, and for its next term unresolved
-    principal = np.copysign(np.maximum(np.abs(principal), FLATTEST / size(body)), principal)
+    principal = np.copysign(np.maximum(np.abs(principal), 1e-8 / size(body)), principal)
     frame = np.einsum("nak,nai->nki", axes, np.stack([q, b], axis=1))
     return SpecularPoints(
         observer=row,
@@ -207,16 +194,16 @@ def _newton(body: Surface, points: FloatArray, wanted: FloatArray, which: IntArr
     points, active = points.copy(), np.arange(len(points))
     for _ in range(30):
         gap, step = _step(body, points[active], wanted[which[active]])
-        moving = gap >= CONVERGED
+        moving = gap >= 1e-10
         active, step = active[moving], step[moving]
         if not len(active):
             break
         long = np.linalg.norm(step, axis=1)
         step *= np.minimum(1.0, largest / np.maximum(long, 1e-300))[:, None]
         points[active] = project(body, points[active] + step)
-    good = np.sum((normal(body, points) - wanted[which]) ** 2, axis=1) < (100 * CONVERGED) ** 2
+    good = np.sum((normal(body, points) - wanted[which]) ** 2, axis=1) < 1e-16
     which, points = which[good], points[good]
-    near = ALIKE * size(body)
+    near = 1e-6 * size(body)
     keep = first_of_equals(which, lambda i, j: np.linalg.norm(points[i] - points[j], axis=1) <= near)
     return which[keep], points[keep]
 
@@ -253,16 +240,18 @@ def specular_on_pieces(
     body: Any, numbers: tuple[int, ...], direction: FloatArray, observers: FloatArray
 ) -> list[SpecularPoints]:
     """Lit specular points on each of some pieces, of a unit direction and unit observers (m, 3)."""
-    pieces, tiles, found = pieces_of(body), tiles_of(body, SHARE), []
+    pieces, tiles, found = pieces_of(body), tiles_of(body, 0.05), []
     for number in numbers:
         corners = tiles.corners[tiles.pieces == number]
         if not len(corners) or _is_flat(pieces[number], corners.mean(axis=1), size(body)):
             continue
-        corners = corners + INWARD * (corners.mean(axis=1, keepdims=True) - corners)
+        # drawn to their middles: at a tip there is no normal
+        corners = corners + 1e-6 * (corners.mean(axis=1, keepdims=True) - corners)
         vertices = corners.reshape(-1, 3)
         mesh = Triangulation(vertices, np.arange(len(vertices)).reshape(-1, 3))
         points = specular_points(pieces[number], direction, observers, mesh)
-        x = points.points + OUTWARD * size(body) * points.normals
+        # so far off the body it is asked whether anything is in the way
+        x = points.points + 1e-7 * size(body) * points.normals
         there = np.zeros(len(x), dtype=bool)
         if len(x):
             r = observers[points.observer]

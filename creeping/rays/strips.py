@@ -21,17 +21,6 @@ from creeping.rays.quantities import LANES, START_LANES, RayPoints
 from creeping.rays.tracer import RayTracer
 from creeping.shadow.attachment import line_tangents
 
-DEGREE = 5
-ROUND = 40
-"""Rays of a closed strip beyond either end that its splines go through."""
-COARSE = 64
-"""Steps at least that a search looks at."""
-FINE_TURN = 0.08
-"""Largest angle by which a ray turns in one step: polynomials of degree 9 then err by about 3e-11."""
-MANY, APART = 512, 4
-"""Points of a ray that are enough, unless they were more than so many steps apart: strips between them err by 3e-5 of J
-then, between rays that lie much farther apart."""
-
 
 def ray_points(fan: RayFan, times: FloatArray | None = None) -> tuple[FloatArray, RayPoints]:
     """Points of every ray of a fan, at equal steps that resolve the body if not at given times.
@@ -47,8 +36,11 @@ def ray_points(fan: RayFan, times: FloatArray | None = None) -> tuple[FloatArray
     InvalidInputError
         If the body is weighted.
     """
-    tracer = RayTracer(fan.body, fan.length, turn=FINE_TURN)
-    count = min(tracer.steps, max(MANY, -(-tracer.steps // APART)))
+    # polynomials of degree 9 then err by about 3e-11
+    tracer = RayTracer(fan.body, fan.length, turn=0.08)
+    # so many points are enough, unless they were more than four steps apart: strips between them err by 3e-5 of J then,
+    # between rays that lie much farther apart
+    count = min(tracer.steps, max(512, -(-tracer.steps // 4)))
     equal: FloatArray = fan.length / count * np.arange(count + 1, dtype=np.float64)
     times = equal if times is None else times
     rays, steps = len(fan.points), len(times)
@@ -118,7 +110,7 @@ class Strip:
     @property
     def coarse_steps(self) -> IntArray:
         """Steps at which a search looks first, the last one among them."""
-        stride = max(1, (len(self.times) - 1) // COARSE)
+        stride = max(1, (len(self.times) - 1) // 64)
         return np.unique(np.append(np.arange(0, len(self.times), stride), len(self.times) - 1))
 
     @property
@@ -132,15 +124,15 @@ class Strip:
         """Splines of the lanes in (σ, s) and of the starts in σ."""
         sigma, lanes, starts = self.positions, self.rays.lanes, self.rays.starts[:, 0]
         if self.closed:
-            # what a ray does to the spline fades by half from ray to ray: so many on either side make it periodic
-            rows = np.arange(-ROUND, len(sigma) + ROUND + 1)
+            # what a ray does to the spline fades by half from ray to ray: 40 on either side make it periodic
+            rows = np.arange(-40, len(sigma) + 41)
             sigma = sigma[rows % len(sigma)] + self.period * (rows // len(sigma))
             lanes, starts = lanes[rows % len(lanes)], starts[rows % len(starts)]
-        degree = DEGREE if len(sigma) > DEGREE else max(1, 2 * ((len(sigma) - 1) // 2) - 1)
+        degree = 5 if len(sigma) > 5 else max(1, 2 * ((len(sigma) - 1) // 2) - 1)
         knots, table = _interpolating(sigma, lanes, degree)
-        later, along = _interpolating(self.times, np.moveaxis(table, 1, 0), DEGREE)
+        later, along = _interpolating(self.times, np.moveaxis(table, 1, 0), 5)
         first = BSpline(*_interpolating(sigma, starts, degree), degree)
-        return NdBSpline((knots, later), np.moveaxis(along, 0, 1), (degree, DEGREE)), first
+        return NdBSpline((knots, later), np.moveaxis(along, 0, 1), (degree, 5)), first
 
     def wrap(self, sigma: FloatArray) -> FloatArray:
         """σ within the strip's period."""
@@ -157,21 +149,9 @@ class Strip:
         alive = self._alive(sigma, s) & (points[:, 9] > 0) & (first[:, 2] > 0)
         return RayPoints(points, first, s, np.asarray(alive), self.rays.scale)
 
-    def slopes(self, sigma: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Derivatives in σ and in s of (x, p): (n,), (n,) -> (n, 6), (n, 6)."""
-        lanes, _ = self._splines
-        where = np.stack([self.wrap(sigma), s], axis=-1)
-        return lanes(where, nu=(1, 0))[:, :6], lanes(where, nu=(0, 1))[:, :6]
-
-    def spreading_slopes(self, sigma: FloatArray, s: FloatArray) -> FloatArray:
-        """Derivatives of J and J' in σ, 1/L and 1/L^2: (n,), (n,) -> (n, 2)."""
-        lanes, _ = self._splines
-        return np.asarray(lanes(np.stack([self.wrap(sigma), s], axis=-1), nu=(1, 0))[:, 6:8])
-
-    def attenuation_slopes(self, sigma: FloatArray, s: FloatArray) -> FloatArray:
-        """Derivative of the integral of κₙ^(2/3) in σ, L^(-2/3): (n,), (n,) -> (n,)."""
-        lanes, _ = self._splines
-        return np.asarray(lanes(np.stack([self.wrap(sigma), s], axis=-1), nu=(1, 0))[:, 14])
+    def slopes(self, sigma: FloatArray, s: FloatArray, along: int = 0) -> FloatArray:
+        """Derivatives of the lanes in σ, or with 1 ``along`` the rays, in s: (n,), (n,) -> (n, LANES)."""
+        return np.asarray(self._splines[0](np.stack([self.wrap(sigma), s], axis=-1), nu=(1 - along, along)))
 
     def _alive(self, sigma: FloatArray, s: FloatArray) -> BoolArray:
         """Whether both neighbouring rays are creeping there, at the step before."""

@@ -26,7 +26,7 @@ from creeping.geometry.evaluators import speed_of, speed_values
 from creeping.geometry.incident import headings
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface
-from creeping.kernels.threads import CHUNK
+from creeping.kernels.threads import BLOCK
 from creeping.shadow.attachment import LaunchPoints
 
 
@@ -72,7 +72,7 @@ def carried(flow: Flow, launch: LaunchPoints, times: FloatArray, *, components: 
     """States (n, rays, m, components) of all rays at the times (m,); what stands for no ray is not to be read."""
     there = launch.there
     n, rays = there.shape
-    padded = -(-rays // CHUNK) * CHUNK
+    padded = -(-rays // BLOCK) * BLOCK
     some = np.flatnonzero(there.any(axis=1))
     if not len(some):
         return np.full((n, rays, len(times), components), np.nan)

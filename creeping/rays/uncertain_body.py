@@ -11,14 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import Any, FloatArray
-from creeping.geodesics.bundle import project_bundle
 from creeping.geodesics.direct_flow import DirectFlow
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import pack, project_bundle
 from creeping.geometry.arguments import one_of, whole_number
 from creeping.geometry.incident import headings, openings
 from creeping.geometry.surface import project
+from creeping.rays.ends import RayStatus
 from creeping.rays.fan import RayFan, launch
-from creeping.rays.status import RayStatus
 from creeping.rays.tracer import RTOL
 from creeping.rays.transport import spread
 from creeping.shadow.attachment import line_tangents

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray
-from creeping.geodesics.piece_walk import REACH
+from creeping.geodesics.pieces import REACH
 from creeping.geometry.piecewise import Tiles, nearest_crease, piece_ahead, tips_of
 from creeping.geometry.surface import size
 from creeping.shadow.curves import Moved, moved_onto_lines, tangents_at

@@ -27,7 +27,7 @@ from creeping.geometry.arguments import checked_body, folder_path, real_array, r
 from creeping.geometry.directions import azimuth_elevation_of, directions_from_azimuth_elevation
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface, size, why_no_rays
-from creeping.phaseflow.tuning.request import choose_flow
+from creeping.phaseflow.request import choose_flow
 from creeping.rays.fan import launch
 from creeping.rays.reach import body_length
 from creeping.rays.transport import Flow

@@ -18,7 +18,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from creeping._typing import FloatArray
-from creeping.kernels.private_cache import private_folder, require_private
+from creeping.kernels.cache import private_folder, require_private
 
 SCHEMA = 15
 """Counts up with every change of what is stored or of how it is fitted."""

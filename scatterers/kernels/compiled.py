@@ -30,8 +30,7 @@ from numba.experimental import function_type as _function_type  # noqa: F401
 from numba.extending import typeof_impl
 
 from creeping._typing import FloatArray
-from creeping.kernels.cache import discard_stale
-from creeping.kernels.private_cache import keep_private
+from creeping.kernels.cache import discard_stale, keep_private
 
 F = TypeVar("F", bound=Callable[..., Any])
 # products may be contracted to fused multiply-adds, nothing else: a NaN stays a NaN and no sum is reordered

@@ -19,8 +19,7 @@ import numpy as np
 import creeping as cr
 import scatterers as sc
 from creeping._typing import FloatArray, IntArray
-from creeping.geodesics.bundle import project_bundle, random_bundle_points
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import pack, project_bundle, random_bundle_points
 from creeping.geometry.surface import normal, project
 from studies import Row, main
 from studies.accuracy.bodies import rms

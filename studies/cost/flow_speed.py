@@ -22,12 +22,11 @@ from scipy.integrate import solve_ivp
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, FloatArray
-from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.integrator import trace_states
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import pack, random_bundle_points
 from creeping.geometry.surface import normal
 from creeping.phaseflow.building import measure
-from creeping.phaseflow.tuning.request import tuned_direct
+from creeping.phaseflow.request import tuned_direct
 from studies import Row, main
 from studies.accuracy.bodies import rms
 

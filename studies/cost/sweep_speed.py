@@ -21,7 +21,7 @@ import scatterers as sc
 from creeping._typing import Any, FloatArray
 from creeping.geometry.directions import fibonacci_directions, great_circle
 from creeping.geometry.incident import rows_of
-from creeping.phaseflow.tuning.request import tuned_direct
+from creeping.phaseflow.request import tuned_direct
 from creeping.shadow.arcs import finished
 from creeping.shadow.curves import Curves
 from creeping.shadow.line import TOGETHER, shadow_lines

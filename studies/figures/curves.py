@@ -8,8 +8,7 @@ from scipy.interpolate import CubicHermiteSpline
 import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, FloatArray
-from creeping.geodesics.bundle import random_bundle_points
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import pack, random_bundle_points
 from creeping.phaseflow.splines import Grid
 from creeping.plotting._drawing import View
 from creeping.plotting._strokes import RAY_COLOUR, LevelColours, Stroke, closed

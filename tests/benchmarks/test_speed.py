@@ -9,10 +9,9 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.integrator import trace_states
-from creeping.geodesics.states import pack
-from creeping.phaseflow.tuning.request import tuned_direct
+from creeping.geodesics.states import pack, random_bundle_points
+from creeping.phaseflow.request import tuned_direct
 
 pytestmark = pytest.mark.slow
 BODIES = {"ellipsoid": sc.Ellipsoid(1.2, 0.8, 0.8), "twisted": sc.TwistedEllipsoid()}

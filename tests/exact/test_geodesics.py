@@ -6,9 +6,8 @@ import shared_bodies as sc
 from tolerances import INVARIANT, TRACE
 
 import creeping as cr
-from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.integrator import trace_states
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import pack, random_bundle_points
 from creeping.geometry.curvature import gaussian_curvature
 
 TIMES = np.array([0.4, 1.0, 2.5, 4.0])

@@ -6,7 +6,7 @@ from piecewise_bodies import Ball
 
 import creeping as cr
 from creeping.field.waves.likely_cells import parted
-from creeping.geodesics.own_times import trace_own
+from creeping.geodesics.attenuation import trace_own
 from creeping.geodesics.pieces import trace_pieces, trace_to
 from creeping.geodesics.states import ATTENUATION, DETACHMENT, M11, M12, P, X, pack
 from creeping.rays.tracer import RayTracer

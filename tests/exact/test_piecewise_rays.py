@@ -8,8 +8,7 @@ from piecewise_bodies import TwoBalls, cut_sphere
 
 import creeping as cr
 from creeping.errors import InvalidInputError
-from creeping.geodesics.piece_walk import REACH
-from creeping.geodesics.pieces import trace_pieces
+from creeping.geodesics.pieces import REACH, trace_pieces
 from creeping.geodesics.states import ATTENUATION, M11, M12, M21, M22, P, X, pack
 from creeping.geometry.surface import size
 

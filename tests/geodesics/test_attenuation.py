@@ -15,9 +15,8 @@ from creeping.geodesics.attenuation import (
     halves,
     lagrange,
 )
-from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.integrator import trace_states
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import pack, random_bundle_points
 from creeping.geometry.curvature import normal_curvature
 from creeping.geometry.evaluators import speed_values
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from creeping.geodesics.states import P, X, cubic_at
+from creeping.geodesics.pieces import cubic_at
+from creeping.geodesics.states import P, X
 
 
 def test_a_cubic_curve_is_its_own(rng):

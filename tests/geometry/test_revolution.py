@@ -6,7 +6,7 @@ import pytest
 import creeping as cr
 import scatterers as sc
 from creeping.geometry.revolution import axis_of_revolution, charted_axis, rotations
-from creeping.phaseflow.coordinates.base import model_of
+from creeping.phaseflow.coordinates import model_of
 
 X, _, Z = np.eye(3)
 

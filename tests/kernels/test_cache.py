@@ -8,7 +8,7 @@ from pathlib import Path
 import numba
 import pytest
 
-from creeping.kernels import private_cache
+from creeping.kernels import cache
 from creeping.kernels.cache import discard_stale
 
 ROOT = Path(__file__).parents[2]
@@ -57,23 +57,23 @@ def package(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("named", [False, True])
 def test_folders_that_others_can_write_are_not_used(package, tmp_path, monkeypatch, named):
-    private_cache.keep_private(package, 64 * "a")
+    cache.keep_private(package, 64 * "a")
     assert os.environ["NUMBA_CACHE_DIR"] == ""
     (tmp_path / "named").mkdir(mode=0o755)
     if named:
         monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "named"))
-        private_cache.keep_private(package, 64 * "a")
+        cache.keep_private(package, 64 * "a")
         assert os.environ["NUMBA_CACHE_DIR"] == str(tmp_path / "named")
     bad = tmp_path / "named" if named else package / "kernels/__pycache__"
     bad.chmod(0o777)
     with pytest.warns(RuntimeWarning, match=f"go-w.*{bad}"):
-        private_cache.keep_private(package, 64 * "a")
+        cache.keep_private(package, 64 * "a")
     place = Path(os.environ["NUMBA_CACHE_DIR"])
     assert place == tmp_path / "cache/creeping-kernels" / (16 * "a") == Path(numba.config.CACHE_DIR)
     assert place.stat().st_mode & 0o777 == 0o700
     # the other package adds its digest, once, and says nothing
-    private_cache.keep_private(package, 64 * "b")
-    private_cache.keep_private(package, 64 * "b")
+    cache.keep_private(package, 64 * "b")
+    cache.keep_private(package, 64 * "b")
     assert os.environ["NUMBA_CACHE_DIR"] == f"{place}-{16 * 'b'}"
 
 
@@ -82,7 +82,7 @@ def test_no_folder_at_all_is_an_error(package, tmp_path):
     (tmp_path / "cache/creeping-kernels").mkdir(parents=True)
     (tmp_path / "cache/creeping-kernels").chmod(0o777)
     with pytest.raises(PermissionError, match="as well; make it yours alone"):
-        private_cache.keep_private(package, 64 * "a")
+        cache.keep_private(package, 64 * "a")
 
 
 @pytest.mark.parametrize(
@@ -93,9 +93,9 @@ def test_who_can_write(tmp_path, mode, above, expected):
     folder = tmp_path / "above/own"
     folder.mkdir(parents=True)
     folder.chmod(mode), folder.parent.chmod(above)
-    assert private_cache.open_to_others(folder, frozenset((os.getuid(),))) is expected
-    assert private_cache.open_to_others(folder, frozenset((os.getuid() + 1,)))
-    assert not private_cache.open_to_others(folder / "none", frozenset())
+    assert cache.open_to_others(folder, frozenset((os.getuid(),))) is expected
+    assert cache.open_to_others(folder, frozenset((os.getuid() + 1,)))
+    assert not cache.open_to_others(folder / "none", frozenset())
 
 
 def test_kernels_are_compiled_into_the_private_folder(tmp_path):

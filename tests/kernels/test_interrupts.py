@@ -18,7 +18,7 @@ from tests.plain_body import PlainEllipsoid
 ROOT = Path(__file__).parents[2]
 BEGIN = """
 import sys, numpy as np, creeping as cr, scatterers as sc
-from creeping.geodesics.bundle import random_bundle_points
+from creeping.geodesics.states import random_bundle_points
 from creeping.geodesics.states import pack
 body, rng = sc.Ellipsoid(1.0, 0.8, 0.6), np.random.default_rng(0)
 direct = cr.DirectFlow(body)

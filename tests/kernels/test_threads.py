@@ -14,11 +14,10 @@ import scatterers as sc
 from creeping.field.currents import radiation
 from creeping.field.equation.split_sums import SmoothKernel, SplitSums
 from creeping.geodesics import integrator
-from creeping.geodesics.bundle import random_bundle_points
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import pack, random_bundle_points
 from creeping.kernels import threads
 from creeping.kernels.threads import in_slices, in_threads
-from creeping.phaseflow.coordinates import rotation
+from creeping.phaseflow import rotation
 from tests.plain_body import PlainEllipsoid
 
 

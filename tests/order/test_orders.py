@@ -6,9 +6,8 @@ import shared_bodies as sc
 from tolerances import ORDER
 
 import creeping as cr
-from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.integrator import trace_states
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import pack, random_bundle_points
 from creeping.phaseflow.building import measure
 
 

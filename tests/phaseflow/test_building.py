@@ -5,7 +5,7 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.geodesics.bundle import random_bundle_points
+from creeping.geodesics.states import random_bundle_points
 from creeping.phaseflow.building import measure, upper_bound
 
 EXAMPLES = {

@@ -6,8 +6,8 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.phaseflow.building import Plan
+from creeping.phaseflow.search import _scaled
 from creeping.phaseflow.splines import MARGIN, Grid, least_cells
-from creeping.phaseflow.tuning.search import _scaled
 
 SPHERE = sc.Sphere()
 

@@ -9,9 +9,8 @@ from scipy.special import betainc
 
 import creeping as cr
 import scatterers as sc
-from creeping.geodesics.bundle import random_bundle_points
-from creeping.geodesics.states import pack
-from creeping.phaseflow.coordinates.rotation import bent_floor
+from creeping.geodesics.states import pack, random_bundle_points
+from creeping.phaseflow.rotation import bent_floor
 
 
 def test_the_bend_is_what_its_slope_says():

@@ -6,11 +6,10 @@ from tolerances import COMPOSED, MAP
 
 import creeping as cr
 import scatterers as sc
-from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.integrator import trace_states
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import pack, random_bundle_points
 from creeping.phaseflow.building import Plan, build_direct
-from creeping.phaseflow.coordinates.base import has_mirrors, model_of
+from creeping.phaseflow.coordinates import has_mirrors, model_of
 from creeping.phaseflow.splines import Grid
 
 

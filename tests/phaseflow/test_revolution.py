@@ -5,12 +5,11 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.geodesics.bundle import random_bundle_points
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import pack, random_bundle_points
 from creeping.geometry.revolution import charted_axis, rotations
+from creeping.phaseflow import rotation as compiled_models
 from creeping.phaseflow.building import Plan, build_direct
-from creeping.phaseflow.coordinates import rotation as compiled_models
-from creeping.phaseflow.coordinates.base import model_of
+from creeping.phaseflow.coordinates import model_of
 from creeping.phaseflow.splines import Grid
 
 TILTED = np.array([1.0, 2.0, 2.0]) / 3

@@ -9,7 +9,7 @@ import creeping as cr
 from creeping.field.waves.far_geometry import far_geometry
 from creeping.geodesics.pieces import trace_to
 from creeping.geodesics.states import P, pack
-from creeping.rays import aimed
+from creeping.rays import tracer
 
 OGIVE = sc.Ogive(1.0, 10.0)
 SEEN = cr.fibonacci_directions(10)
@@ -72,7 +72,7 @@ def test_rays_that_are_found_go_back_to_the_wave():
     found = far_geometry(fan, directions).shed
     r, times = directions[found.observer], found.rays.time
     assert len(times) > 20
-    np.testing.assert_allclose(found.rays.directions, r, atol=2 * aimed.ACCEPTED)
+    np.testing.assert_allclose(found.rays.directions, r, atol=2 * tracer.ACCEPTED)
     back, end = trace_to(body, pack(found.rays.points, -found.rays.directions), times, rtol=1e-12)
     # one that comes within reach of a tip again ends there
     on = times < end
@@ -95,8 +95,8 @@ def test_searches_whose_first_step_is_long_lead_nowhere(monkeypatch):
     """Those that end there, against searches that all go on."""
     body, d = sc.TwistedEllipsoid(), np.array([0.3, 0.5, 0.812])
     line, found = cr.shadow_line(body, d / np.linalg.norm(d)), []
-    for step in (aimed.STEP, np.inf):
-        monkeypatch.setattr(aimed, "STEP", step)
+    for step in (tracer.STEP, np.inf):
+        monkeypatch.setattr(tracer, "STEP", step)
         fan = cr.launch(cr.DirectFlow(body, rtol=1e-8), line, length=4.0, n_rays=256)
         found.append(len(far_geometry(fan, SEEN).shed.observer))
     assert found[0] == found[1] > 40

@@ -7,7 +7,7 @@ from body_checks import directions
 from oracles.plain_sweep import PlainSweeper
 
 import creeping as cr
-from creeping.rays.status import RayStatus
+from creeping.rays.ends import RayStatus
 from creeping.shadow.status import FAILED, NO_RAY, OK, SINGULAR
 from creeping.sweeping.request import sweep_request
 from creeping.sweeping.sweeper import Sweeper

@@ -9,7 +9,7 @@ from body_checks import assert_locator, assert_sphere_map, call, directions, eva
 
 import creeping as cr
 import scatterers as sc
-from creeping.geodesics.bundle import project_bundle, random_bundle_points
+from creeping.geodesics.states import project_bundle, random_bundle_points
 from creeping.geometry.surface import normal
 from scatterers.charts.star import Spine
 from scatterers.fits.tensor import TensorSpline, coefficients, interpolation_operator

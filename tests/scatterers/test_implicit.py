@@ -11,7 +11,7 @@ from body_checks import assert_derivatives, assert_sphere_map, directions
 from tolerances import TRACE
 
 import creeping as cr
-from creeping.geodesics.bundle import random_bundle_points
+from creeping.geodesics.states import random_bundle_points
 from scatterers.charts.samples import body_cloud
 from scatterers.implicit import Implicit
 

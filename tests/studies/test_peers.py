@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 import shared_bodies as sc
 
-from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.integrator import trace_states
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import pack, random_bundle_points
 from studies.cost.flow_speed import scipy_flow
 
 BODIES = {"triaxial": sc.Ellipsoid(1.0, 0.8, 0.6), "torus": sc.Torus(), "twisted": sc.TwistedEllipsoid()}

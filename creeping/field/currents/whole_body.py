@@ -51,7 +51,7 @@ from creeping.field.arguments import UNRESOLVED, observers_of
 from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
 from creeping.field.currents.radiation import far_of_scalar, field_of_scalar, phase_sums, received
 from creeping.field.results.far_result import FarField
-from creeping.geodesics.bundle import as_points
+from creeping.geodesics.states import as_points
 from creeping.geometry.checks import unit_of
 from creeping.geometry.quadrature import body_nodes, inner_points
 from creeping.geometry.surface import Surface, inside

@@ -36,7 +36,7 @@ from creeping.field.equation.columns import solved_columns
 from creeping.field.equation.matrix import DIRECTIONS, Matrix, Places
 from creeping.field.equation.tiles import Tiles, gauss
 from creeping.field.results.far_result import spherical_frame
-from creeping.geodesics.bundle import as_points
+from creeping.geodesics.states import as_points
 from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.quadrature import box_points
 from creeping.geometry.surface import Surface, size

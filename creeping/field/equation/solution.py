@@ -35,7 +35,7 @@ from creeping.field.results.point_result import (
     scalar_on_body,
 )
 from creeping.field.waves.reflected import plane_reflection
-from creeping.geodesics.bundle import as_points
+from creeping.geodesics.states import as_points
 from creeping.geometry.checks import unit_of
 from creeping.geometry.surface import Surface, size
 from creeping.geometry.surface import inside as inside_of

@@ -34,8 +34,8 @@ from creeping.field.boundary import Boundary
 from creeping.field.marching.profile import LEAST_NODES, RayProfiles
 from creeping.field.waves.far_geometry import fan_strips
 from creeping.field.waves.shed_wave import smoothstep
+from creeping.geodesics.attenuation import trace_own
 from creeping.geodesics.integrator import trace_states
-from creeping.geodesics.own_times import trace_own
 from creeping.geodesics.pieces import trace_pieces
 from creeping.geodesics.states import M11, M21, WITH_JACOBI, P, X, pack
 from creeping.geometry.curvature import normal_curvature
@@ -180,8 +180,8 @@ def wide_rows(fan: RayFan) -> list[IntArray]:
 def _attenuation_slopes(strip: Strip, times: FloatArray) -> FloatArray:
     """dA/dsigma_perp of the rays of a strip at times of their own (rays, m), sigma_perp along b."""
     sigma = strip.positions
-    slopes = strip.attenuation_slopes(np.repeat(sigma, times.shape[1]), times.ravel()).reshape(times.shape)
-    along = strip.slopes(sigma, np.zeros(len(sigma)))[0][:, :3]
+    slopes = strip.slopes(np.repeat(sigma, times.shape[1]), times.ravel())[:, 14].reshape(times.shape)
+    along = strip.slopes(sigma, np.zeros(len(sigma)))[:, :3]
     b = np.cross(strip.first_normals(sigma), strip.rays.directions[:, 0])
     return np.asarray(slopes / np.sum(along * b, axis=1)[:, None])
 

@@ -37,10 +37,10 @@ from creeping.field.waves.ray_sums import RaySum
 from creeping.field.waves.strip_waves import StripTable, around, modes_on_strip
 from creeping.geometry.piecewise import has_edges, is_piecewise
 from creeping.geometry.surface import Surface, memo_of
+from creeping.rays.ends import AT_CREASES, RayStatus
 from creeping.rays.fan import RayFan
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays
-from creeping.rays.status import AT_CREASES, RayStatus
 from creeping.rays.strips import Strip
 
 KEPT = 2

@@ -26,8 +26,8 @@ from creeping.field.ports.sums import port_sums
 from creeping.field.ports.tensor import TENSORS
 from creeping.field.results.point_result import FieldStatus
 from creeping.field.special.airy import hard_modes
-from creeping.geodesics.bundle import as_points, on_body
 from creeping.geodesics.equations import points_of_charts
+from creeping.geodesics.states import as_points, on_body
 from creeping.geometry.arguments import checked_body, positive_number, real_array
 from creeping.geometry.checks import unit_of
 from creeping.geometry.curvature import curvature_norms

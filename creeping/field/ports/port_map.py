@@ -23,7 +23,7 @@ from creeping.field.ports.path_waves import path_waves
 from creeping.field.ports.sums import port_sums
 from creeping.field.results.labelled import power
 from creeping.field.results.point_result import FieldStatus, PointField, point_dataset
-from creeping.geodesics.bundle import as_points, on_body
+from creeping.geodesics.states import as_points, on_body
 from creeping.geometry.checks import unit_of
 from creeping.geometry.surface import Surface, size
 from creeping.rays.reach import AUTO

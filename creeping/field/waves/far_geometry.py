@@ -35,14 +35,13 @@ from creeping.geometry.evaluators import evaluators
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface, memo, memo_of, normal, size
 from creeping.geometry.triangulation import Triangulation
-from creeping.rays.aimed import rays_towards, same_within
 from creeping.rays.fan import RayFan
 from creeping.rays.observer_contour import HorizonRays, MidHorizon, forward_nodes
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays, free_ways
 from creeping.rays.specular import SpecularPoints, specular_points
 from creeping.rays.strips import Strip, strips_of
-from creeping.rays.tracer import TURN, RayTracer
+from creeping.rays.tracer import TURN, RayTracer, rays_towards, same_within
 from creeping.rays.transport import Flow, carried
 from creeping.shadow.attachment import LaunchPoints, occluded
 from creeping.shadow.line import ShadowLine, shares_of

@@ -56,9 +56,9 @@ from creeping.geometry.curvature import curvature_norms
 from creeping.geometry.piecewise import Tiles, is_convex, pieces_of, tiles_of
 from creeping.geometry.surface import memo, size
 from creeping.kernels.threads import in_threads
+from creeping.rays.ends import AT_CREASES, RayStatus
 from creeping.rays.fan import RayFan
 from creeping.rays.specular import SpecularPoints, smooth_parts, specular_on_pieces, stand_clear
-from creeping.rays.status import AT_CREASES, RayStatus
 from creeping.shadow.attachment import occluded
 from creeping.shadow.piecewise import convex, unit_normals
 from creeping.storage.memory import within_budget

@@ -39,10 +39,10 @@ from creeping.field.results.point_result import FieldStatus
 from creeping.field.waves.far_geometry import fan_strips
 from creeping.field.waves.near_wave import first_order_share
 from creeping.field.waves.shed_wave import left_out
+from creeping.rays.ends import RayStatus
 from creeping.rays.fan import RayFan
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays
-from creeping.rays.status import RayStatus
 from creeping.rays.strips import Strip
 
 CLOSE = 0.3
@@ -231,7 +231,7 @@ def fold_share(strips: tuple[Strip, ...], shed: ShedRays, wavenumber: float) -> 
     for number, strip in enumerate(strips):
         mine = np.flatnonzero(shed.strip == number)
         if len(mine):
-            bend = strip.spreading_slopes(shed.sigma[mine], rays.time[mine])
+            bend = strip.slopes(shed.sigma[mine], rays.time[mine])[:, 6:8]
             slope[mine] = (bend[:, 0] + reach[mine] * bend[:, 1]) / rays.width[mine]
     tube = rays.spreading + reach * rays.spreading_rate
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):

@@ -12,9 +12,6 @@ from creeping.geodesics.kernels.flow_derivative import two_thirds
 from creeping.kernels.block import BLOCK, aligned, entry_options, options
 from creeping.kernels.exponential import second_form
 
-SAMPLES = 23
-"""Rows of work space of `extend`: twelve Gauss points, both ends, the least of them, eight Chebyshev times."""
-
 
 @njit(**entry_options)
 def curvatures(level, level_par, speed, speed_par, weighted, states, out):
@@ -45,7 +42,8 @@ def extend(values, rules, time, now, a, sampled, count):
     """Carry A and the time of detachment, rows of a (2, BLOCK), over one leap; see `attenuation.extend`.
 
     values (BLOCK, 8), flat, are c^(3/2) kappa_n at the Chebyshev times; ``rules`` are the sampling and the searching
-    matrix, Gauss points and weights, and the Chebyshev points. sampled (SAMPLES, BLOCK) is work space.
+    matrix, Gauss points and weights, and the Chebyshev points. sampled (23, BLOCK) is work
+    space: twelve Gauss points, both ends, the least of them, eight Chebyshev times.
     """
     sampling, searching, points, weights, nodes = rules
     gauss = points.shape[0]

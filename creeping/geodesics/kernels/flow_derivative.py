@@ -10,7 +10,7 @@ Arrays of a block are component by component, each of BLOCK numbers. Evaluators 
 views that are made once, and what takes their results from there on takes addresses: making a view, or telling a
 function of an array, takes as long as the arithmetic.
 
-Also here: compiled twin of `bundle.bundle_points`: points and directions of a caller are checked and put onto T1Q.
+Also here: compiled twin of `states.bundle_states`: points and directions of a caller are checked and put onto T1Q.
 
 Sources: Derivations, R1, R3 and R13.
 """
@@ -23,10 +23,6 @@ from numba import carray, njit
 from creeping.kernels.block import BLOCK, aligned, entry_options, options
 from creeping.kernels.exponential import adjugate_form, second_form
 from creeping.kernels.vectors import LANES, load, loads, pointer, root, spread, store
-
-STEPS = 8
-"""Most Newton steps onto the body, as of `geometry.surface.project`."""
-
 
 _three, _four, _six = (loads(rows, BLOCK) for rows in (3, 4, 6))
 
@@ -183,7 +179,8 @@ def enter(level, level_par, points, directions, off, close, least, out):
         for i in range(BLOCK):
             for k in range(3):
                 x[k, i] = points[start + min(i, count - 1), k]
-        for step in range(STEPS + 1):
+        # at most 8 Newton steps, as of `geometry.surface.project`
+        for step in range(9):
             level(x, value, geometry[1:4], geometry[4:], level_par)
             moving = 0
             for i in range(count):
@@ -191,7 +188,7 @@ def enter(level, level_par, points, directions, off, close, least, out):
                 distance = abs(value[i]) / math.sqrt(square)
                 if step == 0 and not distance <= off:
                     refused += 1
-                if step < STEPS and not distance <= close:
+                if step < 8 and not distance <= close:
                     moving += 1
                     part = value[i] / square
                     x[0, i] -= part * gx[i]

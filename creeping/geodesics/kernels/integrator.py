@@ -7,16 +7,15 @@ units of the tolerance a step is accepted where e < 1, and the next one is
 
 Half the usual exponent: which ray is the worst changes all the time, and a step that follows each of them is refused
 again and again, and costs a third more at equal error than equal steps do; this one costs a tenth more at most.
-An output ends a step, or two equal ones or more, where that costs little: a step is then from LANDING to STRETCHED of
+An output ends a step, or two equal ones or more, where that costs little: a step is then from 0.6 to 1.1 of
 what it may be, has three stages less, and errs less. Other outputs are read from the step's polynomial of order 7 and
 put onto T1Q. Where A is carried all outputs end steps: A' has a kink where kappa_n passes 0, and errors of the
 polynomial there are a hundred times those of the steps.
 
-Also here: compiled tracer of rays each to a time of its own; arithmetic as in `creeping.geodesics.kernels.integrator`.
+Rays that are traced each to a time of its own go side by side in a block, y' = h_i f(y), each with its own step h_i:
+what stops one of them does not stop others.
 
-Rays of a block go side by side, y' = h_i f(y), each with its own step h_i: what stops one of them does not stop others.
-
-Sources: [HNW93, sec. II.4 to II.6 and II.10]; Derivations, R3; [HNW93, sec. II.10].
+Sources: [HNW93, sec. II.4 to II.6 and II.10]; Derivations, R3.
 """
 
 import math
@@ -25,17 +24,12 @@ import numpy as np
 from numba import njit
 
 from creeping.geodesics.kernels.flow_derivative import derivative, project_block
-from creeping.geodesics.tableaus import DORMAND_PRINCE_8, FIFTH, SOLUTION, STAGE_WEIGHTS, STAGES, THIRD
+from creeping.geodesics.tableaus import STAGE_WEIGHTS, STAGES
 from creeping.kernels.block import BLOCK, aligned, options
 from creeping.kernels.vectors import LANES, larger, load, magnitude, pointer, root, spread, stage_sum, stage_sums, store
 
-LANDING, STRETCHED = 0.6, 1.1
-"""Shares of the step that adapts: outputs end no shorter steps, and longer ones only to end there."""
-_STAGES = DORMAND_PRINCE_8.stages
-
-
 sum_stages = stage_sums(STAGE_WEIGHTS)
-_solution, _third, _fifth = (stage_sum(STAGE_WEIGHTS, row) for row in (SOLUTION, THIRD, FIFTH))
+_solution, _third, _fifth = (stage_sum(STAGE_WEIGHTS, row) for row in (12, 21, 22))
 
 
 @njit(**options)
@@ -192,8 +186,9 @@ def integrate(
             if goal < times[last]:
                 ahead += times[last] - goal
             if rtol > 0.0:
-                trial = left / math.ceil(left / (STRETCHED * h))
-                if dense_too and trial < LANDING * h:
+                # shares of the step that adapts: outputs end no shorter steps, and longer ones only to end there
+                trial = left / math.ceil(left / (1.1 * h))
+                if dense_too and trial < 0.6 * h:
                     trial = min(h, ahead)
             error, inside = 0.0, trial > left
             if not known:
@@ -261,11 +256,12 @@ def integrate_own(
 ):  # fmt: skip
     """Trace states (n, lanes), each to its time (n,), into out (n, lanes): NaN of a ray that does not come there.
 
-    Arguments are as for `creeping.geodesics.kernels.integrator.integrate`; rtol > 0, and ``limit`` is of each ray.
+    Arguments are as for `integrate`; rtol > 0, and ``limit`` is of each ray.
     """
     n, lanes = states.shape
     size = lanes * BLOCK
-    rows = aligned((_STAGES + 6) * lanes + 22, BLOCK)
+    # the order-8 pair has 12 stages
+    rows = aligned(18 * lanes + 22, BLOCK)
     here, there, ahead = rows[:lanes], rows[lanes : 2 * lanes], rows[2 * lanes : 3 * lanes]
     slope, last, geometry = rows[3 * lanes : 4 * lanes], rows[4 * lanes : 5 * lanes], rows[5 * lanes :]
     weight, trial, errors = geometry[10:20], geometry[20], geometry[21]
@@ -295,8 +291,8 @@ def integrate_own(
             if known:
                 _scaled(f0, size, steps, k)
             # one place for all stages: each takes time to compile
-            for s in range(1 if known else 0, _STAGES + 1):
-                if s == _STAGES:
+            for s in range(1 if known else 0, 13):
+                if s == 12:
                     solution(k, y, z, scale, rtol, 1.0, pointer(steps, BLOCK))
                 elif s > 0:
                     sum_stages(s, 1.0, k, size, y, z)

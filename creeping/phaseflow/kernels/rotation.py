@@ -117,7 +117,7 @@ def locate(r, work, chart, u, v, angle, folded):
 
 
 @njit(**options)
-def move(r, d, centre):
+def move_rotations(r, d, centre):
     """Compose the rotations r (4, BLOCK), flat, with displacements d (BLOCK, 4), flat, and normalise them."""
     c0, c1, c2, c3 = centre[0], centre[1], centre[2], centre[3]
     for i in range(BLOCK):

@@ -1,6 +1,6 @@
 """Compiled conversion of (x, p) to and from rotations by a table of x(u, v) instead of psi.
 
-See `rotation` and `surface_spline`.
+See `rotation`.
 
 With T = [x_u, x_v] and G = T^T T, and the stereographic charts being conformal,
 
@@ -26,43 +26,36 @@ Sources: Derivations, R15, B7 and R18.
 """
 
 import math
-from typing import Any
 
 import numpy as np
-from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
 
 from creeping.kernels.block import BLOCK, aligned, entry_options, options
 from creeping.kernels.exponential import inverse_root, turns
 from creeping.kernels.splines import cells_and_fractions, slopes, weights
+from creeping.kernels.vectors import data_of, load_vector, multiply_add, spread_value, store_vector, whole
 from creeping.phaseflow.kernels.rotation import REACH, face, quaternion, read_block, write_block
 from creeping.phaseflow.kernels.rotation import columns as columns_of
-
-MARGIN = 2.0
-WORK = 48
-"""Rows of work space for a block."""
-DEGREE = 5
-LANES = 4
-_double, _index = ir.DoubleType(), ir.IntType(64)
-_vector = ir.VectorType(_double, LANES)
 
 
 @njit(**options)
 def _look_up(table, chart, u, v, work, cell):
     """x, x_u, x_v (BLOCK, 12), flat, of a block; u and v are used up."""
     w, out = work[8:32].reshape(-1), work[32:44].reshape(-1)
-    cells = table.shape[1] - DEGREE - 2.0 * MARGIN
+    # two nodes lie beyond either edge of a chart
+    cells = table.shape[1] - 9.0
     for axis in range(2):
         t = u if axis == 0 else v
         for i in range(BLOCK):
-            t[i] = MARGIN + 0.5 * cells * (1.0 + t[i] * (1 / REACH))
-        cells_and_fractions(t, table.shape[axis + 1] - DEGREE - 1, cell)
+            t[i] = 2.0 + 0.5 * cells * (1.0 + t[i] * (1 / REACH))
+        cells_and_fractions(t, table.shape[axis + 1] - 6, cell)
         for i in range(BLOCK):
             chart[i] = chart[i] * table.shape[axis + 1] + cell[i]
-        weights(t, DEGREE, w[12 * axis * BLOCK : (12 * axis + 6) * BLOCK])
+        weights(t, 5, w[12 * axis * BLOCK : (12 * axis + 6) * BLOCK])
         slopes(t, w[(12 * axis + 6) * BLOCK : (12 * axis + 12) * BLOCK])
-    tangents(table, chart, w, out)
+    for i in range(BLOCK):
+        _contract(table, 4 * chart[i], 4 * table.shape[2], w, i, out, 12 * i)
     return out
 
 
@@ -79,7 +72,7 @@ def _root(out, i):
 @njit(**entry_options)
 def from_rotations(table, rows):
     """States rows[:, :6] of the rotations that stand in rows[:, :4]."""
-    x, p, r, work = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK), aligned(WORK, BLOCK)
+    x, p, r, work = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK), aligned(48, BLOCK)
     s, q, along, across, u, v = work[0:3], work[3:6], work[44], work[45], work[6], work[7]
     chart, cell = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64)
     for start in range(0, rows.shape[0], BLOCK):
@@ -102,7 +95,7 @@ def from_rotations(table, rows):
 @njit(**entry_options)
 def to_rotations(table, back, back_par, states, rays):
     """Rotations rays[:, :4] of states (n, 6 or more)."""
-    x, p, r, work = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK), aligned(WORK, BLOCK)
+    x, p, r, work = aligned(3, BLOCK), aligned(3, BLOCK), aligned(4, BLOCK), aligned(48, BLOCK)
     s, u, v = work[0:3], work[6], work[7]
     chart, cell, faces = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64)
     for start in range(0, states.shape[0], BLOCK):
@@ -141,55 +134,37 @@ def to_rotations(table, back, back_par, states, rays):
 
 
 @intrinsic
-def _contract(typing: Any, table: Any, offset: Any, stride: Any, weights: Any, place: Any, out: Any, at: Any) -> Any:
+def _contract(typing, table, offset, stride, weights, place, out, at):
     """Write x, x_u, x_v (12 values) to out[at:]; weights (4, 6, BLOCK), flat: wu, wu', wv, wv'."""
-    signature = types.void(table, offset, stride, weights, place, out, at)
 
-    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Any) -> Any:
-        rows, weight, target = (context.make_array(sig.args[k])(context, builder, args[k]).data for k in (0, 3, 5))
+    def codegen(context, builder, sig, args):
+        rows, weight, target = (data_of(context, builder, sig.args[k], args[k]) for k in (0, 3, 5))
 
-        def spread(kind: int, j: int) -> Any:
-            number = (kind * (DEGREE + 1) + j) * BLOCK
-            value = builder.load(builder.gep(weight, [builder.add(args[4], ir.Constant(_index, number))]))
-            empty = ir.Constant(_vector, ir.Undefined)
-            single = builder.insert_element(empty, value, ir.Constant(ir.IntType(32), 0))
-            return builder.shuffle_vector(single, empty, ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES))
+        def spread(kind, j):
+            at = builder.add(args[4], whole((kind * 6 + j) * BLOCK))
+            return spread_value(builder, builder.load(builder.gep(weight, [at])), 4)
 
-        def multiply_add(total: Any, factor: Any, value: Any) -> Any:
-            product = builder.fmul(factor, value, flags=("contract",))
-            return product if total is None else builder.fadd(total, product, flags=("contract",))
-
-        along, slope = [spread(2, j) for j in range(DEGREE + 1)], [spread(3, j) for j in range(DEGREE + 1)]
-        sums: list[Any] = [None] * 3
-        for i in range(DEGREE + 1):
-            row = builder.add(args[1], builder.mul(args[2], ir.Constant(_index, i)))
-            inner: list[Any] = [None] * 2
-            for j in range(DEGREE + 1):
-                pointer = builder.gep(rows, [builder.add(row, ir.Constant(_index, LANES * j))])
-                value = builder.load(builder.bitcast(pointer, _vector.as_pointer()))
-                value.align = 8
-                inner = [multiply_add(inner[0], along[j], value), multiply_add(inner[1], slope[j], value)]
-            sums[0] = multiply_add(sums[0], spread(0, i), inner[0])
-            sums[1] = multiply_add(sums[1], spread(1, i), inner[0])
-            sums[2] = multiply_add(sums[2], spread(0, i), inner[1])
-        for k, total in enumerate(sums):
-            address = builder.gep(target, [builder.add(args[6], ir.Constant(_index, LANES * k))])
-            builder.store(total, builder.bitcast(address, _vector.as_pointer())).align = 8
+        along, slope = [spread(2, j) for j in range(6)], [spread(3, j) for j in range(6)]
+        x = x_u = x_v = None
+        for i in range(6):
+            row = builder.add(args[1], builder.mul(args[2], whole(i)))
+            value = changed = None
+            for j in range(6):
+                coefficient = load_vector(builder, rows, builder.add(row, whole(4 * j)), 4)
+                value = multiply_add(builder, value, along[j], coefficient)
+                changed = multiply_add(builder, changed, slope[j], coefficient)
+            x = multiply_add(builder, x, spread(0, i), value)
+            x_u = multiply_add(builder, x_u, spread(1, i), value)
+            x_v = multiply_add(builder, x_v, spread(0, i), changed)
+        for k, total in enumerate((x, x_u, x_v)):
+            store_vector(builder, total, target, builder.add(args[6], whole(4 * k)))
         return context.get_dummy_value()
 
-    return signature, codegen
+    return types.void(table, offset, stride, weights, place, out, at), codegen
 
 
 @njit(**options)
-def tangents(table, place, w, out):
-    """x, x_u, x_v of a block's stencils into out (BLOCK, 12), flat; see `_contract` for w."""
-    stride = LANES * table.shape[2]
-    for i in range(BLOCK):
-        _contract(table, LANES * place[i], stride, w, i, out, 12 * i)
-
-
-@njit(**options)
-def locate(r, shift, work, chart, u, v, angle):
+def locate_meridian(r, shift, work, chart, u, v, angle):
     """Chart 0, u = 0, v = theta/pi in [0, 1] and angle in turns of a block; the axis is shift[3:6]."""
     ax, ay, az = shift[3], shift[4], shift[5]
     along, one, other, across = work[0], work[1], work[2], work[3]

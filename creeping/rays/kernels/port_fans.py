@@ -27,8 +27,8 @@ from creeping.kernels.block import strict_options as options
 from creeping.rays.kernels.quantities import curvatures_along, polynomial_weights
 from creeping.rays.quantities import SHARPEST, STEEPEST
 
-BEHIND, AHEAD = 2, 3
-"""Nodes that polynomials take before and behind an interval."""
+BEHIND = 2
+"""Nodes that polynomials take before an interval, and one more behind it: six with its own."""
 GUARD = 7
 """Steps traced beyond the last interval: three for its polynomial, one for each integral, two for derivatives."""
 
@@ -58,13 +58,6 @@ LANES, PARTS = 21, 5
 """Their number, and that of the integrals."""
 START = 3
 """Of the port itself: kappa, T and B."""
-TURNED = 1.5
-"""Bound of rho |g|, as of |rho'|, |rho rho''| and |B|: beyond, the expansion has no meaning."""
-NODES = BEHIND + AHEAD + 1
-TRIES, CLOSE = 12, 1e-11
-"""Newton steps, and the last one of them in cells."""
-PAD = 1.3
-"""Radius of a cell, in those of the ball through its corners."""
 
 
 @njit(**options)
@@ -93,9 +86,8 @@ def port_fan(level, level_par, step, scale, squares, states, lanes, last):
         line = lanes[ray]
         last[ray] = count - 1
         for k in range(count + 2):
-            _rates(
-                kappa[ray], kappa[opposite], across[ray], torsion[ray], torsion[opposite], states[ray], step, k, rates
-            )
+            curves = kappa[ray], kappa[opposite], across[ray], torsion[ray], torsion[opposite]
+            _rates(curves, states[ray], step, k, rates)
             if not kappa[ray, k] > 0.0 and k <= last[ray]:
                 last[ray] = k - 1
         leaning[0] = moving[0] = 0.0
@@ -112,12 +104,8 @@ def port_fan(level, level_par, step, scale, squares, states, lanes, last):
             turned = math.atan2(to[LANE.J2], scale * to[LANE.rate])
             before = line[BEHIND + k - 1, LANE.angle] if k > 0 else 0.0
             to[LANE.angle] = turned + 2 * math.pi * math.floor((before - turned) / (2 * math.pi) + 0.5)
-            to[LANE.kappa], to[LANE.T], to[LANE.B], to[LANE.across] = (
-                kappa[ray, k],
-                torsion[ray, k],
-                rates[3, k],
-                across[ray, k],
-            )
+            to[LANE.kappa], to[LANE.T] = kappa[ray, k], torsion[ray, k]
+            to[LANE.B], to[LANE.across] = rates[3, k], across[ray, k]
             to[LANE.turning], to[LANE.moving] = leaning[k], moving[k]
             for q in range(PARTS):
                 row = (0, 1, 2, 7, 5)[q]
@@ -136,8 +124,9 @@ def port_fan(level, level_par, step, scale, squares, states, lanes, last):
 
 
 @njit(**options)
-def _rates(kappa, kappa_back, across, torsion, torsion_back, states, step, k, rates):
+def _rates(curves, states, step, k, rates):
     """At node k the integrands of A, of both exponents without g, B, and those of A_theta, K, A_0 and the spreading."""
+    kappa, kappa_back, across, torsion, torsion_back = curves
     before, behind = kappa[k - 1] if k > 0 else kappa_back[1], kappa[k - 2] if k > 1 else kappa_back[2 - k]
     slope = (8 * (kappa[k + 1] - before) - (kappa[k + 2] - behind)) / (12 * step)
     bend = (16 * (kappa[k + 1] + before) - 30 * kappa[k] - kappa[k + 2] - behind) / (12 * step * step)
@@ -170,7 +159,8 @@ def _add_torsion(kappa, torsion, leaning, spreading, squares, k, rates):
         root, g = kappa ** (1 / 3), 4 / 3 * torsion
         if k > 0 and spreading != 0.0:
             g = root * leaning / spreading
-        g = min(max(g, -TURNED * kappa), TURNED * kappa)
+        # as of |rho'|, |rho rho''| and |B|: beyond, the expansion has no meaning
+        g = min(max(g, -1.5 * kappa), 1.5 * kappa)
         rates[1, k] -= (0.25 * squares * g * g - 2 / 3 * g * torsion + 0.4 * torsion * torsion) * root**4 / kappa**2
 
 
@@ -186,7 +176,7 @@ def _stretch(rates, row, k, step, central):
 
 @njit(**options)
 def _sum(lanes, m, k, aside, along, first, many, out):
-    """Sums of so many lanes from the first, around cell (m, k), by weights (NODES,) in angle and in s."""
+    """Sums of so many lanes from the first, around cell (m, k), by weights (6,) in angle and in s."""
     for lane in range(many):
         out[lane] = 0.0
     for i in range(aside.shape[0]):
@@ -201,7 +191,7 @@ def _sum(lanes, m, k, aside, along, first, many, out):
 def _refined(lanes, matrix, m, k, target, place, w, work):
     """Newton's method for x(angle, s) = target from the place (2,), in cells from node (m, k); returns success."""
     point, along, aside = work[0], work[1], work[2]
-    for _ in range(TRIES):
+    for _ in range(12):
         if not (abs(place[0] - 0.5) < 1.5 and abs(place[1] - 0.5) < 1.5):
             return False
         for axis in range(2):
@@ -226,7 +216,7 @@ def _refined(lanes, matrix, m, k, target, place, w, work):
             first, second = 0.7 * first / longest, 0.7 * second / longest
         place[0] += first
         place[1] += second
-        if longest < CLOSE:
+        if longest < 1e-11:
             return True
     return False
 
@@ -241,7 +231,7 @@ def passed(lanes, last, matrices, ports, order, along, after, pad, folds, owner,
     ----------
     lanes, last
         Of `port_fan`.
-    matrices : (NODES, NODES) x 2
+    matrices : (6, 6) x 2
         `polynomial_matrix` of the nodes around a cell, and of the four nearest of them.
     order, along : (n,), int
         Numbers of ports by their coordinate of number ``along``.
@@ -256,10 +246,10 @@ def passed(lanes, last, matrices, ports, order, along, after, pad, folds, owner,
     """
     rays, count = lanes.shape[0], lanes.shape[1]
     most, total, sorted_ = len(owner), 0, ports[order, along]
-    w, work, place, middle = np.empty((2, 3, NODES)), np.empty((3, 3)), np.empty(2), np.empty(3)
+    w, work, place, middle = np.empty((2, 3, 6)), np.empty((3, 3)), np.empty(2), np.empty(3)
     for m in range(rays):
         one, two = lanes[m], lanes[(m + 1) % rays]
-        for k in range(BEHIND, count - AHEAD):
+        for k in range(BEHIND, count - BEHIND - 1):
             radius = 0.0
             for axis in range(3):
                 middle[axis] = 0.25 * (one[k, axis] + one[k + 1, axis] + two[k, axis] + two[k + 1, axis])
@@ -270,7 +260,8 @@ def passed(lanes, last, matrices, ports, order, along, after, pad, folds, owner,
             most_ = max(max(one[k, LANE.J2], one[k + 1, LANE.J2]), max(two[k, LANE.J2], two[k + 1, LANE.J2]))
             dead = k + 1 - BEHIND > min(last[m], last[(m + 1) % rays])
             folded = least < 0.0 < most_ and k > BEHIND and not dead
-            reach = PAD * radius
+            # of a cell, in radii of the ball through its corners
+            reach = 1.3 * radius
             wide = reach + pad if folded else reach
             number = np.searchsorted(sorted_, middle[along] - wide)
             while number < len(ports) and sorted_[number] <= middle[along] + wide:

@@ -175,12 +175,6 @@ def _along(level, level_par, rule, scale, ray, step, known, kappa, across, norma
 
 
 @njit(**options)
-def _turned(before, J, rate, scale):
-    """Angle phi of (J, -J') next to the one before."""
-    return _nearest(before, math.atan2(-scale * rate, J))
-
-
-@njit(**options)
 def _nearest(before, angle):
     """Angle that differs from a given one by whole turns, next to the one before."""
     return angle + 2 * math.pi * math.floor((before - angle) / (2 * math.pi) + 0.5)
@@ -188,24 +182,9 @@ def _nearest(before, angle):
 
 @njit(**options)
 def quantities_at(
-    level,
-    level_par,
-    matrix,
-    nodes,
-    gauss_weights,
-    scale,
-    states,
-    step,
-    owner,
-    times,
-    whole,
-    joints,
-    observers,
-    lanes,
-    starts,
-    alive,
-    risen,
-):
+    level, level_par, matrix, nodes, gauss_weights, scale, states, step, owner, times, whole, joints, observers, lanes,
+    starts, alive, risen
+):  # fmt: skip
     """Fill lanes (n, 18), starts (n, 9) but for d.x0 and the width, and alive (n,) at points of rays.
 
     Without ``whole`` the angle phi, the integrals and alive are left out.
@@ -266,7 +245,7 @@ def quantities_at(
             lanes[point, 12] = _applied(w, 0, across, i)
             if not whole:
                 continue
-            lanes[point, 8] = _turned(angles[last], lanes[point, 6], lanes[point, 7], scale)
+            lanes[point, 8] = _nearest(angles[last], math.atan2(-scale * lanes[point, 7], lanes[point, 6]))
             positive = good[last]
             for d in range(5):
                 parts[d, 0] = totals[last, d]

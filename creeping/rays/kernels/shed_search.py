@@ -36,10 +36,7 @@ class Sample(NamedTuple):
     kappa: int = 14
 
 
-AT, SAMPLE = Sample(), 15
-"""And the number of its components."""
-AWAY = -0.5
-"""p.r at the end of a step up to which it is passed over; a step turns a ray by about a radian at most."""
+AT = Sample()
 
 
 def quintic_weights(step: float) -> np.ndarray:
@@ -105,7 +102,7 @@ def _sample(level, level_par, weights, states, first, work, fine, J):
 
 @njit(**options)
 def sample_fan(level, level_par, weights, states, arc, first, samples, alive, work):
-    """Fill samples (rays, SAMPLE, m) of a fan from step ``first`` on, and alive (rays,); returns the mean rho^(1/3).
+    """Fill samples (rays, 15, m) of a fan from step ``first`` on, and alive (rays,); returns the mean rho^(1/3).
 
     ``alive`` says whether kappa_n > 0 at the states up to ``first``. states (rays, K, 10); the mean is over the launch
     points.
@@ -156,7 +153,7 @@ def seek(step, samples, certain, arc, closed, r, back, skipped, early, along, ce
     ----------
     step : float
         Time between states.
-    samples, certain : (rays, SAMPLE, m), (rays,)
+    samples, certain : (rays, 15, m), (rays,)
         See `sample_fan`; the first ``skipped`` of a ray are not there.
     arc, closed : (rays,)
         Number of each ray's arc, not finite where there is no ray, and 1 if the arc is a whole curve.
@@ -247,11 +244,6 @@ def _cubic(a, p, b, q, u):
 
 
 @njit(**options)
-def _ahead(state, r):
-    return state[3] * r[0] + state[4] * r[1] + state[5] * r[2]
-
-
-@njit(**options)
 def _mixed(one, two, i):
     """Whether the corners of a cell have not all one sign."""
     some = (one[i] > 0.0) + (one[i + 1] > 0.0) + (two[i] > 0.0) + (two[i + 1] > 0.0)
@@ -278,25 +270,9 @@ def _bilinear(one, two, i):
 
 @njit(**options)
 def seek_all(
-    level,
-    level_par,
-    step,
-    weights,
-    states,
-    arcs,
-    closed,
-    observers,
-    back,
-    early,
-    along,
-    most,
-    crossings,
-    found,
-    places,
-    crossed,
-    chi,
-    roots,
-):
+    level, level_par, step, weights, states, arcs, closed, observers, back, early, along, most, crossings, found,
+    places, crossed, chi, roots
+):  # fmt: skip
     """`seek` for incidences (n) with observers (n, m, 3) each, numbered through.
 
     found (f, 4) is filled with observers and cells, places (f, 2) with the fractions in them, crossed (c, 4) with
@@ -306,10 +282,10 @@ def seek_all(
     n, rays = arcs.shape
     K, many = states.shape[2], observers.shape[1]
     m = (K - 1) * PARTS + 1
-    heights, samples = np.empty((rays, 3, m)), np.empty((rays, SAMPLE, m))
+    heights, samples = np.empty((rays, 3, m)), np.empty((rays, 15, m))
     alive, work = np.empty(rays, np.bool_), np.empty(13 * K + 16 * m)
     cells, inside = np.empty((most, 3), np.int64), np.empty((most, 2))
-    ray_of, at = np.empty(crossings, np.int64), np.empty((crossings, 2))
+    ray_of, times = np.empty(crossings, np.int64), np.empty((crossings, 2))
     total = passed = 0
     for row in range(n):
         # steps that no observer looks at are passed over
@@ -318,8 +294,12 @@ def seek_all(
             if not arcs[row, ray] < 1e9:
                 continue
             for o in range(many):
-                k = 0
-                while k < first and _ahead(states[row, ray, k + 1], observers[row, o]) < AWAY:
+                k, r = 0, observers[row, o]
+                while k < first:
+                    at = states[row, ray, k + 1]
+                    # a step turns a ray by about a radian at most
+                    if at[3] * r[0] + at[4] * r[1] + at[5] * r[2] >= -0.5:
+                        break
                     k += 1
                 first = min(first, k)
             if first == 0:
@@ -328,7 +308,7 @@ def seek_all(
         for o in range(many):
             a, b, chi[row, o] = seek(
                 step, samples, alive, arcs[row], closed[row], observers[row, o], back[row, o], first * PARTS, early,
-                along, cells, inside, heights, ray_of, at,
+                along, cells, inside, heights, ray_of, times,
             )  # fmt: skip
             if a < 0 or total + a > found.shape[0] or passed + b > crossed.shape[0]:
                 return -1, -1
@@ -338,7 +318,7 @@ def seek_all(
                 copy(inside[k], places[total + k])
             for k in range(b):
                 crossed[passed + k, 0], crossed[passed + k, 1] = row * many + o, ray_of[k]
-                copy(at[k], crossed[passed + k, 2:])
+                copy(times[k], crossed[passed + k, 2:])
             total += a
             passed += b
     return total, passed

@@ -10,7 +10,7 @@ from creeping.field.equation import effort
 from creeping.field.marching.fan_waves import fan_waves
 from creeping.field.waves.strip_waves import modes_on_strip
 from creeping.geometry.quadrature import body_nodes
-from creeping.rays.status import RayStatus
+from creeping.rays.ends import RayStatus
 from studies.accuracy import point_coverage
 
 K = 20.0

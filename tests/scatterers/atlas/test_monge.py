@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 import creeping as cr
 import scatterers as sc
-from creeping.geodesics.bundle import random_bundle_points
+from creeping.geodesics.states import random_bundle_points
 from creeping.geometry.evaluators import polar_frame
 from creeping.geometry.surface import project
 from scatterers.charts.monge import MongeAtlas

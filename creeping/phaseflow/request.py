@@ -2,7 +2,7 @@
 
 Direct integration takes c_d seconds a ray, with the longest equal steps that meet the tolerance; a map takes b seconds
 to build and c_m a ray. For N rays the map is chosen if b + N c_m < N c_d. All three are counted work times nominal
-seconds (`nominal_cost`), c_m once more after the build: the choice follows from what was asked for and from the maps
+seconds (`search`), c_m once more after the build: the choice follows from what was asked for and from the maps
 in the cache, not from how busy the machine is.
 
 Sources: Derivations, R16.
@@ -15,11 +15,10 @@ import numpy as np
 
 from creeping._typing import FloatArray
 from creeping.errors import IntegrationError, ToleranceError
-from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.integrator import ErrorEstimate, trace_states
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import pack, random_bundle_points
 from creeping.geometry.arguments import checked_body, folder_path, number_between, positive_number, reporter
 from creeping.geometry.piecewise import checked_smooth, is_piecewise
 from creeping.geometry.surface import Surface, size
@@ -33,25 +32,23 @@ from creeping.phaseflow.building import (
     upper_bound,
     with_errors,
 )
-from creeping.phaseflow.cache import cached_phase_map, is_cached
-from creeping.phaseflow.coordinates.base import model_of
-from creeping.phaseflow.coordinates.rotation import CompiledModel
+from creeping.phaseflow.cache import cached_phase_map, cached_place
+from creeping.phaseflow.coordinates import model_of
+from creeping.phaseflow.map_spec import RAYS, MapSpec
 from creeping.phaseflow.phase_map import PhaseMap
+from creeping.phaseflow.rotation import CompiledModel
+from creeping.phaseflow.search import (
+    Candidate,
+    candidates,
+    direct_seconds,
+    map_seconds,
+    tracing_cost,
+    tuned_map,
+)
 from creeping.phaseflow.splines import Grid
-from creeping.phaseflow.tuning.map_spec import RAYS, MapSpec
-from creeping.phaseflow.tuning.nominal_cost import direct_seconds, map_seconds, tracing_cost
-from creeping.phaseflow.tuning.search import Candidate, candidates, tuned_map
 
-SAMPLES = 512
-"""Rays on which direct integration is measured, fewer where F is expensive."""
-BUDGET = 0.2
-"""Nominal seconds that one measurement may take."""
-QUICK = 0.3
-"""Nominal seconds of direct integration below which nothing is tuned."""
 WORTH = 0.85
 """Share of direct integration that a map must be expected to take less than, and its tuning too."""
-SMALLEST = 60_000
-"""Nodes of the smallest map that is worth estimating."""
 
 
 def build_phase_map(
@@ -265,7 +262,7 @@ def _stored(spec: MapSpec, tolerance: float, cache: bool | str | Path) -> MapSpe
     if tolerance < 1e-9:
         return None
     for one in (spec, replace(spec, n_rays=RAYS)):
-        if is_cached(one.body, one.key(), folder=cache):
+        if cached_place(one.body, one.key(), cache).exists():
             return one
     return None
 
@@ -278,7 +275,8 @@ def _chosen(
     length = spec.length
     assert length is not None
     cost = tracing_cost(body)
-    if n_rays * length * cost < QUICK and not stored:
+    # below, nothing is tuned
+    if n_rays * length * cost < 0.3 and not stored:
         progress(f"direct integration: carrying {n_rays} rays takes about {n_rays * length * cost:.1g} s, fields apart")
         return _untuned_direct(body, length, n_steps, tolerance)
     direct, each = tuned_direct(body, length, n_steps, tolerance, carry_jacobi)
@@ -313,8 +311,8 @@ def _worth_building(spec: MapSpec, direct: float, cost: float, tolerance: float)
     time = f"carrying {spec.n_rays} rays takes about {direct:.2g} s, fields apart"
     if tolerance < 1e-9:
         return [], f"no map reaches such a tolerance; {time}"
-    # what the smallest map takes, so that probing is not begun in vain
-    least = 0.3 + SMALLEST * (1e-6 + cost * natural_horizon(body) / 8) * (2.5 if spec.carry_jacobi else 1.0)
+    # what the smallest map takes, of 60 000 nodes, so that probing is not begun in vain
+    least = 0.3 + 60_000 * (1e-6 + cost * natural_horizon(body) / 8) * (2.5 if spec.carry_jacobi else 1.0)
     if not isinstance(model_of(body), CompiledModel):
         return [], f"{body!r} has no compiled sphere map nor a doubly periodic chart"
     if direct < least:
@@ -362,7 +360,9 @@ def tuned_direct(
     """
     horizon = length / n_steps
     cost = tracing_cost(body)
-    count = int(np.clip(BUDGET / (cost * length), 32, SAMPLES))
+    # nominal seconds that one measurement may take
+    budget = 0.2
+    count = int(np.clip(budget / (cost * length), 32, 512))
     times = np.array([length])
     reference = float(np.clip(1e-3 * tolerance, 1e-14, 1e-9))
     rng = np.random.default_rng(2)
@@ -377,7 +377,7 @@ def tuned_direct(
     reached = np.inf
     for _ in range(12):
         try:
-            error = sampled_errors(errors, count, 1 if 4 * cost * length * count > BUDGET else 16)[:, 0]
+            error = sampled_errors(errors, count, 1 if 4 * cost * length * count > budget else 16)[:, 0]
             reached = upper_bound(error)
         except IntegrationError:
             reached = np.inf

@@ -11,8 +11,8 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
-from creeping.phaseflow.tuning.nominal_cost import direct_seconds, evaluation_seconds, map_seconds, tracing_cost
-from creeping.phaseflow.tuning.request import tuned_direct
+from creeping.phaseflow.request import tuned_direct
+from creeping.phaseflow.search import direct_seconds, evaluation_seconds, map_seconds, tracing_cost
 from tests.plain_body import PlainEllipsoid
 
 ROOT = Path(__file__).parents[3]

@@ -1,6 +1,6 @@
 """Maps stored as displacements of rotations or of angles: what their kernels need, and the plain numpy twins.
 
-Formulas are those of `phaseflow.kernels.rotation` and `phaseflow.kernels.angles`.
+Formulas are those of `phaseflow.kernels.rotation`.
 
 Also here: unit quaternions (w, x, y, z) of rotations, arrays (n, 4).
 
@@ -32,8 +32,6 @@ from creeping.geometry.surface import Surface, size
 from creeping.kernels.threads import in_slices, in_threads, pause
 from creeping.phaseflow.splines import Grid, Leap, interpolation_operator
 
-REACH = float(np.sqrt(2) - 1)
-"""Stereographic coordinate of a chart's edge; see `phaseflow.kernels.rotation`."""
 ORDERED = 16_384
 """Rays from which on composing them in the order of their cells pays,"""
 NEAR = 24_000_000
@@ -42,18 +40,6 @@ SHARE = 65_536
 """Rays ordered at a time."""
 BUDGET = 5000
 """Leaps of blocks after which the kernels come up for signals: 0.01 to 0.2 s."""
-EXIT_SIDES = (48, 72, 108, 160)
-EXIT_ERROR = 1e-9
-"""Rms error of (x, p) by such a table, x in body sizes."""
-SUREST = 0.3
-"""Least cosine between successive displacements of a rotation that leaves no doubt about its sign."""
-
-SHORTEST = 0.2
-"""Least q0 of a displacement: nearer to 0 it is not known well from q."""
-LOW, OF_LEAST = 0.1, 0.5
-"""Threshold over the largest curvature of the nodes; and over the least, where that is positive."""
-TESTED = 4
-"""Random rays of a cell."""
 
 
 class CompiledModel:
@@ -99,18 +85,18 @@ class CompiledModel:
         raise NotImplementedError
 
     def at(self, chart: int, u: FloatArray, v: FloatArray, angle: FloatArray) -> FloatArray:
-        """See `Model`."""
+        """Coordinates of points of a chart, u and v in [0, 1] on its square, angle in radians: (n,) x 3 -> (n, 4)."""
         raise NotImplementedError
 
     def states(self, coordinates: FloatArray) -> FloatArray:
-        """See `Model`."""
+        """Points and directions: (n, 4) -> (n, 6)."""
         out = np.empty((len(coordinates), 6))
         out[:, :4] = coordinates
         in_slices(lambda part: self._to_body(out[part]), len(coordinates))
         return out
 
     def displacement(self, nodes: FloatArray, traced: FloatArray, times: FloatArray) -> FloatArray:
-        """See `Model`.
+        """Displacement to the last of the traced states (n, m, 6 or more), followed to it: (n, 4).
 
         Raises
         ------
@@ -126,7 +112,8 @@ class CompiledModel:
             found, its = self._between(nodes, rays[step::steps], found)
             # a cosine that is not a number must not get lost
             sure = float(np.min([sure, its]))
-        if not sure >= SUREST:
+        # a cosine of successive displacements that leaves no doubt about the sign of a rotation
+        if not sure >= 0.3:
             raise ToleranceError(
                 f"displacements over {times[-1] / len(times):.3g} are too long to follow (cosine {sure:.2f}); "
                 "give a shorter horizon"
@@ -134,10 +121,9 @@ class CompiledModel:
         return found
 
     def flow(self, grid: Grid, leap: Leap, states: FloatArray, counts: IntArray) -> FloatArray:
-        """See `Model`."""
+        """Compose counts[0], then counts[1], ... maps on states (n, 6, 10 or 12): (n, m, the same)."""
         from creeping.kernels.block import aligned
-        from creeping.phaseflow.kernels.composition import flow
-        from creeping.phaseflow.kernels.nodes import flow_ordered
+        from creeping.phaseflow.kernels.composition import flow, flow_ordered
 
         out = np.empty((len(states), len(counts), states.shape[1]))
         states = np.ascontiguousarray(states, dtype=float)
@@ -169,7 +155,7 @@ class CompiledModel:
 
         The last two are empty if the leap does not carry them.
         """
-        from creeping.phaseflow.kernels.nodes import double
+        from creeping.phaseflow.kernels.composition import double
 
         out = np.empty((len(nodes), 4))
         matrices = np.empty((len(nodes) if leap.has_jacobi else 0, 4))
@@ -195,7 +181,7 @@ class RotationModel(CompiledModel):
     @cached_property
     def _surface_table(self) -> FloatArray:
         """Table of x(u, v) for the kernels, none if psi itself is to be used."""
-        return exit_table(self.body, self)
+        return exit_table(self.body)
 
     def _to_model(self, states: FloatArray, rays: FloatArray) -> None:
         from creeping.phaseflow.kernels import rotation, surface_table
@@ -225,9 +211,9 @@ class RotationModel(CompiledModel):
         return np.array([*half, grid.cells[2]]), np.array([*(grid.origin + half), 0.0])
 
     def at(self, chart: int, u: FloatArray, v: FloatArray, angle: FloatArray) -> FloatArray:
-        """See `Model`."""
+        """As for all models."""
         # [s, q, s x q] is the chart's own rotation, times that of (u, v) at angle 0, times a turn about s
-        u, v = (REACH * (2 * np.asarray(value) - 1) for value in (u, v))
+        u, v = ((np.sqrt(2) - 1) * (2 * np.asarray(value) - 1) for value in (u, v))
         across = 1 + u * u + v * v
         s = np.stack([(2 - across) / across, 2 * u / across, 2 * v / across], axis=1)
         q = np.stack([-s[:, 1], 1 - u * s[:, 1], -v * s[:, 1]], axis=1)
@@ -252,16 +238,12 @@ class OctantModel(RotationModel):
     kind = 2
     charts = 3
 
-    @cached_property
-    def _surface_table(self) -> FloatArray:
-        return RotationModel(self.body)._surface_table
-
     def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
         """See `CompiledModel`."""
         return grid.cells, np.array([*grid.origin, 0.0])
 
     def at(self, chart: int, u: FloatArray, v: FloatArray, angle: FloatArray) -> FloatArray:
-        """See `Model`; u and v in [0, 1] are those in [1/2, 1] of the whole chart."""
+        """As for all models; u and v in [0, 1] are those in [1/2, 1] of the whole chart."""
         return super().at(2 * chart, 0.5 + 0.5 * np.asarray(u), 0.5 + 0.5 * np.asarray(v), angle)
 
 
@@ -296,7 +278,7 @@ class AngleModel(CompiledModel):
         return grid.cells, np.zeros(3)
 
     def at(self, chart: int, u: FloatArray, v: FloatArray, angle: FloatArray) -> FloatArray:
-        """See `Model`."""
+        """As for all models."""
         return np.stack([u, v, angle / (2 * np.pi), np.zeros_like(u)], axis=1)
 
 
@@ -305,9 +287,12 @@ def _tables(leap: Leap) -> tuple[Any, ...]:
     return leap.state, leap.centre, leap.jacobi, leap.matrix, leap.curvature, leap.flagged
 
 
-def exit_table(body: Surface, model: "RotationModel") -> FloatArray:
-    """Coefficients (6, n, n, 4) of x(u, v) on the charts where psi is an iteration, none (0, 1, 1, 4) elsewhere."""
-    found = np.zeros((0, 1, 1, 4))
+def exit_table(body: Surface) -> FloatArray:
+    """Coefficients (6, n, n, 4) of x(u, v) on the charts where psi is an iteration, none (0, 1, 1, 4) elsewhere.
+
+    The coarsest table with an rms error of (x, p) below 1e-9, x in body sizes.
+    """
+    found, model = np.zeros((0, 1, 1, 4)), RotationModel(body)
     model._surface_table = found
     if not getattr(getattr(body.atlas, "sphere_map", None), "iterative", False):
         return found
@@ -316,7 +301,7 @@ def exit_table(body: Surface, model: "RotationModel") -> FloatArray:
     one, other, angle = rng.random((3, 2048))
     at = np.concatenate([model.at(c, one[chart == c], other[chart == c], angle[chart == c]) for c in range(6)])
     exact = model.states(at)
-    for side in EXIT_SIDES:
+    for side in (48, 72, 108, 160):
         grid = Grid((side, side, 1), 5, (False, False))
         u, v = (values.ravel() for values in np.meshgrid(*grid.axes()[:2], indexing="ij"))
         points = np.stack([model.states(model.at(c, u, v, np.zeros_like(u)))[:, :3] for c in range(6)])
@@ -328,7 +313,7 @@ def exit_table(body: Surface, model: "RotationModel") -> FloatArray:
         model._surface_table = np.ascontiguousarray(values)
         error = (model.states(at) - exact) / np.array([size(body)] * 3 + [1.0] * 3)
         model._surface_table = found
-        if float(np.sqrt(np.mean(np.sum(error**2, axis=1)))) < EXIT_ERROR:
+        if float(np.sqrt(np.mean(np.sum(error**2, axis=1)))) < 1e-9:
             return np.ascontiguousarray(values)
     return found
 
@@ -368,13 +353,14 @@ def packed_lanes(model: CompiledModel, values: FloatArray, matrices: FloatArray,
     q = values[:, :3]
     if not isinstance(model, AngleModel):
         turned = np.where(values[:, :1] < 0, -values, values)
-        if turned[:, 0].min() < SHORTEST:
+        # nearer to 0, q0 is not known well from q
+        if turned[:, 0].min() < 0.2:
             return None
         q = turned[:, 1:]
     sampling, _, points, weights, _ = kernel_rules()
     curvature = bent @ sampling[: len(points)].T
     most, least = float(bent.max()), float(curvature.min())
-    threshold = min(LOW * most, OF_LEAST * least) if least > 0 else LOW * most
+    threshold = min(0.1 * most, 0.5 * least) if least > 0 else 0.1 * most
     attenuation = time * (bent_floor(curvature, threshold) ** (2 / 3) @ weights)
     return np.concatenate([q, matrices, attenuation[:, None]], axis=1)
 
@@ -408,7 +394,7 @@ def with_flags(model: CompiledModel, grid: Grid, leap: Leap, tolerance: float) -
     one = np.array([1])
     for chart in range(model.charts):
         bad = np.zeros(len(corner), dtype=bool)
-        for _ in range(TESTED):
+        for _ in range(4):
             u, v, turns = ((corner + rng.random(corner.shape)) / cells).T
             states = model.states(model.at(chart, u, v, 2 * np.pi * turns))
             states = pack(states[:, :3], states[:, 3:], lanes=WHOLE)

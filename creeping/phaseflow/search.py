@@ -7,8 +7,17 @@ the ray by the Jacobi matrices: G(T0)^2 = sum_k |M(L) M(k T0)^-1|^2/2, geometric
     e_u^2 + e_v^2 + e_a^2 <= (tolerance/G)^2,   all three equal where nodes are fewest.
 
 Of all candidates the one that is cheapest for the rays to come, its build included, is built, measured at the end of
-rays, and refined until it meets the tolerance; three at most in turn. Costs are nominal (`nominal_cost`): a map follows
-from what was asked for, not from the machine that built it.
+rays, and refined until it meets the tolerance; three at most in turn. Costs are counted work times nominal seconds of
+a unit of it:
+
+    evaluation   e, of F with its derivatives and of what a stage of a ray makes of them
+    tracing      steps of 64 rays, counted, times 64 STAGES e
+    build        nodes (tracing + 6e-7 s + DOUBLING d) and 0.1 s
+    a ray        leaps times `leap_seconds`, and the conversion to the map's coordinates and back
+
+No clock is read: what is chosen by these figures follows from body, tolerance, length and number of rays, the same on
+every machine and however busy it is. All seconds were measured on one core of a 2.9 GHz x86-64 with AVX-512; on another
+machine everything is faster or slower alike, and what is cheaper than what stays.
 
 Sources: Derivations, R16.
 """
@@ -19,42 +28,28 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray
 from creeping.errors import ToleranceError
-from creeping.geodesics.bundle import random_bundle_points
+from creeping.geodesics.attenuation import NODES, fine_spacing
+from creeping.geodesics.direct_flow import DirectFlow
 from creeping.geodesics.equations import natural_horizon
 from creeping.geodesics.integrator import trace_states
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import pack, random_bundle_points
+from creeping.geometry.evaluators import speed_of
 from creeping.geometry.surface import Surface, size
+from creeping.kernels.threads import BLOCK
 from creeping.phaseflow.building import Plan, Progress, Reference, build_direct, curvature_reach, with_errors
-from creeping.phaseflow.coordinates.base import Model, model_of
+from creeping.phaseflow.coordinates import Model, model_of
+from creeping.phaseflow.map_spec import MapSpec
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.phaseflow.splines import MARGIN, Grid, least_cells, thinning_operator
-from creeping.phaseflow.tuning.map_spec import MapSpec
-from creeping.phaseflow.tuning.nominal_cost import (
-    build_seconds,
-    doublings_of,
-    leap_seconds,
-    measuring_seconds,
-    tracing_cost,
-)
 
 MAX_NODES = 4_000_000
 """Nodes of the largest grid that is built."""
-MAX_BYTES = 150e6
-"""Largest table that composes at a useful speed: beyond the cache every stencil is 36 reads from memory."""
-LINES = 24
-"""Rows probed along each axis."""
-CELLS = 192
-"""Cells of a probed row; it has divisors enough to try many grids."""
-STRIDES = (2, 3, 4, 6, 8, 12, 16, 24)
-COARSE = 1_500_000
-"""Nodes from which on a coarser map is built first, to measure how errors grow."""
-BUDGET, SHARE = (0.02, 0.4), 0.02
-"""Least and most nominal seconds of one probe or measurement, as a share of direct integration of all rays."""
-SINGLE, RISKY = 4e-9, 1.2e-8
-"""Errors of one leap, in units of (x, p): float32 coefficients are tried down to the first, and given up at the first
-failure below the second; their rounding makes about 1e-8."""
 SAFE = 0.5
 """Share of the tolerance that is aimed at."""
+STAGES = 12
+"""Evaluations of a step of the order-8 pair."""
+DOUBLING = 4e-7
+"""Seconds that a node takes of a doubling."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +96,8 @@ def tuned_map(spec: MapSpec, progress: Progress, found: list[Candidate] | None =
     spent, known = 0.0, dict[Any, Reference]()
     for candidate in found[:3]:
         plan, before = candidate.plan, np.inf
-        if model.charts * int(np.prod(plan.grid.nodes)) > COARSE:
+        # a coarser one is built first, to measure how errors grow
+        if model.charts * int(np.prod(plan.grid.nodes)) > 1_500_000:
             plan = _scaled(plan, 0.6)
         for _ in range(6):
             progress(f"T0 = {plan.horizon:g}, {model.charts} x {' x '.join(map(str, plan.grid.nodes))} nodes")
@@ -115,13 +111,16 @@ def tuned_map(spec: MapSpec, progress: Progress, found: list[Candidate] | None =
             if reached <= tolerance:
                 result.parameters.update(tolerance=tolerance, length=spec.length)
                 return result
-            limited = candidate.target < RISKY * np.hypot(1, size(body)) or reached > 0.5 * before
+            # rounding of float32 coefficients makes about 1e-8 of one leap: they go at the first failure near that
+            limited = candidate.target < 1.2e-8 * np.hypot(1, size(body)) or reached > 0.5 * before
             if plan.single and spec.precision is None and limited:
                 # the grid is no longer what limits it
                 plan, before = replace(plan, single=False), np.inf
             else:
                 full = model.charts * int(np.prod(plan.grid.nodes)) > 0.9 * MAX_NODES
-                plan, before = _finer(plan, reached / (SAFE * tolerance)), reached
+                # every axis, so that its error falls by the excess, at least by a tenth of its cells
+                excess = (reached / (SAFE * tolerance)) ** (1 / (plan.grid.degree + 1))
+                plan, before = _scaled(plan, float(np.clip(1.02 * excess, 1.06, 2.0))), reached
                 most = MAX_NODES / (model.charts * int(np.prod(plan.grid.nodes)))
                 if full:
                     break
@@ -156,12 +155,13 @@ def _measured(built: PhaseMap, spec: MapSpec, cost: float, known: dict[Any, Refe
     expensive = 4 * cost * length * samples > budget
     rtol = 1e-3 * spec.tolerance if expensive else 1e-12
     result = with_errors(built, spec.length, samples=samples, rtol=rtol, most=1 if expensive else 16, known=known)
-    return result, measuring_seconds(cost, length, result.error.samples, rtol)
+    # steps of order 8 shorten like rtol^(1/8)
+    return result, cost * length * result.error.samples * float((1e-9 / rtol) ** (1 / 8))
 
 
 def _budget(spec: MapSpec, cost: float) -> float:
-    """Nominal seconds that one probe or measurement may take."""
-    return float(np.clip(SHARE * spec.magnitude * cost * (spec.length or natural_horizon(spec.body)), *BUDGET))
+    """Nominal seconds that one probe or measurement may take: a share of direct integration of all rays."""
+    return float(np.clip(0.02 * spec.magnitude * cost * (spec.length or natural_horizon(spec.body)), 0.02, 0.4))
 
 
 def candidates(spec: MapSpec, model: Model, cost: float) -> list[Candidate]:
@@ -185,25 +185,17 @@ def candidates(spec: MapSpec, model: Model, cost: float) -> list[Candidate]:
     for k, horizon in enumerate(horizons):
         gain = growth_factor(*stretch, horizon) if spec.length else 1.0
         target = SAFE * tolerance / gain
-        single = spec.precision == "single" or (spec.precision is None and target > SINGLE * np.hypot(1, size(body)))
+        single = spec.precision == "single" or (spec.precision is None and target > 4e-9 * np.hypot(1, size(body)))
         for degree in degrees:
             grid = probe.grid(k, degree, target)
             nodes = model.charts * int(np.prod(grid.nodes))
             nbytes = float(nodes * model.lanes * (4 if single else 8))
             fewest = min(fewest, (nodes, horizon))
-            if nodes > MAX_NODES or nbytes > MAX_BYTES:
+            # larger tables do not compose at a useful speed: beyond the cache every stencil is 36 reads from memory
+            if nodes > MAX_NODES or nbytes > 150e6:
                 continue
-            doublings = doublings_of(horizon, natural, cost)
-            plan = Plan(
-                horizon,
-                grid,
-                single,
-                spec.carry_jacobi,
-                doublings,
-                least_cells(body),
-                curvature_reach(tolerance),
-                tolerance,
-            )
+            doublings, reach = doublings_of(horizon, natural, cost), curvature_reach(tolerance)
+            plan = Plan(horizon, grid, single, spec.carry_jacobi, doublings, least_cells(body), reach, tolerance)
             leap = leap_seconds(degree, nbytes, carry_jacobi=spec.carry_jacobi, flat=model.is_flat)
             build = build_seconds(plan, model, cost) + 2 * _budget(spec, cost)
             found.append(Candidate(plan, leap / horizon, build, target))
@@ -224,10 +216,10 @@ def _horizons(spec: MapSpec, natural: float, cost: float) -> list[float]:
         return [spec.horizon]
     if not spec.length:
         return [natural]
-    # probing a horizon traces some 14 000 rays that far
+    # probing a horizon traces 13 824 rays that far
     # over longer leaps the curvatures are not carried
     reach = natural * (curvature_reach(spec.tolerance or 0.0) if spec.carry_jacobi else 16)
-    longest = max(natural, min(reach, 4 * _budget(spec, cost) / (cost * 3 * LINES * CELLS)))
+    longest = max(natural, min(reach, 4 * _budget(spec, cost) / (cost * 13_824)))
     distance = spec.length / spec.n_steps
     leaps = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024)
     found = [distance / m for m in leaps if 0.4 * natural <= distance / m <= longest]
@@ -258,7 +250,10 @@ def growth_factor(times: FloatArray, stretch: FloatArray, horizon: float) -> flo
 
 
 class _Probe:
-    """Interpolation errors of rows of points along each axis, for several horizons."""
+    """Interpolation errors of rows of points along each axis, for several horizons: 24 rows of 192 cells.
+
+    That has divisors enough to try many grids.
+    """
 
     def __init__(self, body: Surface, model: Model, horizons: list[float]) -> None:
         self.body, self.periodic = body, (*model.periodic, True)
@@ -273,11 +268,12 @@ class _Probe:
     def _row(self, body: Surface, model: Model, axis: int, horizons: FloatArray, times: FloatArray) -> FloatArray:
         """Displacements along one axis: (horizons, lines, points, lanes)."""
         rng = np.random.default_rng(axis)
-        count = CELLS if self.periodic[axis] else CELLS + 1
-        at = [np.repeat(rng.random(LINES), count) for _ in range(3)]
-        at[axis] = np.tile(np.arange(count) / CELLS, LINES)
+        lines, cells = 24, 192
+        count = cells if self.periodic[axis] else cells + 1
+        at = [np.repeat(rng.random(lines), count) for _ in range(3)]
+        at[axis] = np.tile(np.arange(count) / cells, lines)
         at[2] = 2 * np.pi * at[2]
-        chart = np.repeat(rng.integers(model.charts, size=LINES), count)
+        chart = np.repeat(rng.integers(model.charts, size=lines), count)
         coordinates = np.concatenate([model.at(c, *(v[chart == c] for v in at)) for c in range(model.charts)])
         # lines of one chart are consecutive, and stay whole
         times = np.unique(np.concatenate([times, horizons]))
@@ -285,7 +281,7 @@ class _Probe:
         values = []
         for horizon in horizons:
             upto = int(np.searchsorted(times, horizon * (1 - 1e-12))) + 1
-            values.append(model.displacement(coordinates, states[:, :upto], times[:upto]).reshape(LINES, count, -1))
+            values.append(model.displacement(coordinates, states[:, :upto], times[:upto]).reshape(lines, count, -1))
         return np.stack(values)
 
     def errors(self, k: int, axis: int, degree: int) -> tuple[FloatArray, FloatArray]:
@@ -293,14 +289,14 @@ class _Probe:
         data, wraps = self.rows[axis][k], self.periodic[axis]
         count = data.shape[1]
         cells, errors = [], []
-        for stride in STRIDES[::-1]:
-            if CELLS // stride < degree + 4:
+        for stride in (24, 16, 12, 8, 6, 4, 3, 2):
+            if 192 // stride < degree + 4:
                 continue
             spline = np.tensordot(thinning_operator(count, stride, degree, wraps), data[:, ::stride], axes=(1, 1))
             # a chart's margin spares it the ends of the row
             inner = slice(None) if wraps else slice(MARGIN * stride, count - MARGIN * stride)
             difference = np.moveaxis(spline, 0, 1)[:, inner] - data[:, inner]
-            cells.append(CELLS // stride)
+            cells.append(192 // stride)
             errors.append(self.scale * float(np.sqrt(np.mean(np.sum(difference**2, axis=-1)))) + 1e-300)
         return np.array(cells), np.array(errors)
 
@@ -331,12 +327,100 @@ def _grid(cells: list[float], degree: int, periodic: tuple[bool, ...], least: in
     )
 
 
-def _finer(plan: Plan, excess: float) -> Plan:
-    """The plan with every axis refined so that its error falls by the excess, at least by a tenth of its cells."""
-    return _scaled(plan, float(np.clip(1.02 * excess ** (1 / (plan.grid.degree + 1)), 1.06, 2.0)))
-
-
 def _scaled(plan: Plan, factor: float) -> Plan:
     grid = plan.grid
     cells = [factor * c for c in grid.cells]
     return replace(plan, grid=_grid(cells, grid.degree, grid.periodic, plan.least_cells, grid.is_flat))
+
+
+def evaluation_seconds(body: Surface) -> float:
+    """Nominal seconds of F, its gradient and Hessian at one point, and of the speed if there is one.
+
+    Examples
+    --------
+    >>> import scatterers as sc
+    >>> round(1e9 * evaluation_seconds(sc.Sphere()), 3)
+    2.0
+    """
+    seconds = 0.0
+    for source in (body, speed_of(body)):
+        if source is not None:
+            compiled: Any = getattr(source, "compiled", None)
+            # by numpy methods, in blocks of 64: a twisted ellipsoid, and 0.9 of it the calls; else 2 ns for a quadric,
+            # 50 ns for a quintic spline, and a closed form of 50 operations if the level does not tell
+            seconds += 1.1e-6 if compiled is None else 4e-11 * float(getattr(compiled, "operations", 50.0))
+    return seconds
+
+
+def stage_seconds(body: Surface, *, jacobi: bool = False) -> float:
+    """Nominal seconds of one ray and stage: besides F those of (x, p), of the Jacobi matrix, more with a speed."""
+    more = 1.8e-9 if speed_of(body) is not None else 0.0
+    return evaluation_seconds(body) + (1.2e-9 + more) + (1.8e-9 + more if jacobi else 0.0)
+
+
+def tracing_cost(body: Surface) -> float:
+    """Nominal seconds of direct integration at 1e-9 per ray and unit of length, the steps of 256 rays being counted."""
+    length, rays = natural_horizon(body), 256
+    states = pack(*random_bundle_points(body, rays, rng=np.random.default_rng(0)))
+    steps: list[int] = []
+    trace_states(body, states, np.array([length]), rtol=1e-9, step=length / 4, taken=steps)
+    # a stage takes longer where the step adapts
+    return sum(steps) * BLOCK * STAGES * (stage_seconds(body) + 5e-10) / (rays * length)
+
+
+def direct_seconds(flow: DirectFlow, length: float, n_steps: int, *, carry_jacobi: bool) -> float:
+    """Nominal seconds of a ray by equal steps; with the Jacobi matrix the attenuation is carried too."""
+    body, step = flow.body, flow.step
+    assert step is not None
+    if not carry_jacobi:
+        return n_steps * _steps(length / n_steps, step) * STAGES * stage_seconds(body)
+    spacing = fine_spacing(body, flow.rtol, step)
+    fine = n_steps * _steps(length / n_steps, spacing)
+    steps = fine * _steps(length / fine, step)
+    samples = fine * NODES
+    # of a point at which the attenuation is sampled, besides F, 1e-8
+    return steps * STAGES * stage_seconds(body, jacobi=True) + samples * (evaluation_seconds(body) + 1e-8)
+
+
+def _steps(length: float, step: float) -> int:
+    return max(1, int(np.ceil(length / step - 1e-9)))
+
+
+def map_seconds(flow: PhaseMap, length: float, *, carry_jacobi: bool) -> float:
+    """Nominal seconds of a ray by a map."""
+    leap = flow.leaps[-1]
+    flat = flow.grid.is_flat
+    each = leap_seconds(flow.grid.degree, float(leap.state.nbytes), carry_jacobi=carry_jacobi, flat=flat)
+    # and the conversions to the coordinates of the map and back
+    return float(length / flow.horizon * each + 5e-8)
+
+
+def leap_seconds(degree: int, nbytes: float, *, carry_jacobi: bool = False, flat: bool = False) -> float:
+    """Nominal seconds of one leap of a ray anywhere on the body, for a table of (x, p) of so many bytes.
+
+    20 (cubic) and 40 ns in the nearest cache, more by the logarithm of the table beyond 1 MB, where a stencil's cache
+    lines come from farther away. A table without azimuth has 4 or 6 rows where another has 16 or 36.
+    """
+    base, farther = (20.0, 16.0) if degree == 3 else (40.0, 27.0)
+    if flat:
+        base, farther = (10.0, 4.0) if degree == 3 else (16.0, 5.0)
+    leap = 1e-9 * (base + farther * float(np.log2(max(nbytes / 1e6, 1.0))))
+    # Jacobi matrix and curvatures are three times as much, but packed beside each other; the attenuation is summed
+    return (4 if flat else 2) * leap + 20e-9 if carry_jacobi else leap
+
+
+def build_seconds(plan: Plan, model: Model, cost: float) -> float:
+    """Nominal seconds of a direct build, given the `tracing_cost` of the body."""
+    nodes = model.charts * int(np.prod(plan.grid.nodes))
+    # the curvatures are wanted at several times of each leap
+    traced = cost * plan.horizon / 2**plan.doublings * (6.0 if plan.carry_jacobi else 1.0)
+    each = (traced + 6e-7 + DOUBLING * plan.doublings) * (2.5 if plan.carry_jacobi else 1.0)
+    return float(0.1 + nodes * each)
+
+
+def doublings_of(horizon: float, natural: float, cost: float) -> int:
+    """Doublings that make the build fastest: each halves the tracing and costs two leaps and a fit at every node."""
+    d = 0
+    while cost * horizon / 2 ** (d + 1) > DOUBLING and horizon / 2 ** (d + 1) >= natural / 8:
+        d += 1
+    return d

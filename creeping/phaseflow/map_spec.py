@@ -8,24 +8,14 @@ import numpy as np
 from creeping._typing import Any
 from creeping.errors import InvalidInputError
 from creeping.geodesics.equations import natural_horizon
-from creeping.geometry.arguments import (
-    flag,
-    number_between,
-    positive_number,
-    shown,
-    whole_number,
-)
+from creeping.geometry.arguments import flag, number_between, positive_number, shown, whole_number
 from creeping.geometry.surface import Surface, size
-from creeping.phaseflow.coordinates.base import AmbientModel, Model, model_of
+from creeping.phaseflow.coordinates import AmbientModel, Model, model_of
 from creeping.phaseflow.splines import MARGIN, least_cells
 from creeping.storage.memory import within_budget
 
 RAYS = 1_000_000
 """Rays for which a map is tuned unless their number is known: what a build may cost follows from it."""
-MOST_HORIZON, MOST_LENGTH = 256.0, 1e5
-"""Longest horizon of a map and longest rays that one is tuned for, in natural horizons of the body."""
-NODE_BYTES = 1000.0
-"""Memory that a node takes while a map is built."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,7 +48,7 @@ class MapSpec:
     def __post_init__(self) -> None:
         self._plain_numbers()
         tolerance, precision = self.tolerance, self.precision
-        for name, value, most in (("horizon", self.horizon, MOST_HORIZON), ("length", self.length, MOST_LENGTH)):
+        for name, value, most in (("horizon", self.horizon, 256.0), ("length", self.length, 1e5)):
             # a length of some sizes need not wait for what the curvature of the body says
             if value is not None and value > 8 * size(self.body) and value > most * natural_horizon(self.body):
                 raise InvalidInputError(
@@ -81,7 +71,8 @@ class MapSpec:
         # what is wrong with the grid or the tower is found here
         if self.nodes is not None:
             cells = float(np.prod(self.nodes, dtype=float))
-            within_budget(NODE_BYTES * cells, f"a grid of {self.nodes}", "give a coarser one")
+            # what nodes take while a map is built
+            within_budget(1000.0 * cells, f"a grid of {self.nodes}", "give a coarser one")
         if self.method == "tower":
             if None in (self.horizon, self.grid, self.time_step, self.stages):
                 raise InvalidInputError("method='tower' needs horizon, grid, time_step and stages")
@@ -116,8 +107,19 @@ class MapSpec:
 
     @cached_property
     def tower(self) -> tuple[float, int, int] | None:
-        """Burn-in tau, B and S, for method "tower"."""
-        return _tower_base(self.horizon, self.time_step, self.stages) if self.method == "tower" else None
+        """Burn-in tau, B and S, for method "tower": B = (T0/tau)^(1/S) is a whole number >= 2."""
+        if self.method != "tower":
+            return None
+        horizon: Any = self.horizon
+        time_step, stages = positive_number(self.time_step, "time_step"), whole_number(self.stages, "stages")
+        if time_step >= horizon:
+            raise InvalidInputError(
+                f"time_step = {time_step!r} and stages = {stages!r} do not make a tower below {horizon:g}"
+            )
+        base = (horizon / time_step) ** (1 / stages)
+        if abs(base - round(base)) > 1e-9 * base or round(base) < 2:
+            raise InvalidInputError(f"(horizon/time_step)^(1/stages) = {base:.6g} is not a whole number >= 2")
+        return horizon / round(base) ** stages, round(base), stages
 
     @property
     def magnitude(self) -> float:
@@ -163,16 +165,3 @@ def _nodes(grid: tuple[int, ...], degree: int, model: Model) -> tuple[int, int, 
             f"grid = {shown(grid)}: give two or three whole numbers of at least {least} for degree {degree}"
         )
     return nodes
-
-
-def _tower_base(horizon: Any, time_step: Any, stages: Any) -> tuple[float, int, int]:
-    """Check that B = (T0/tau)^(1/S) is a whole number >= 2."""
-    time_step, stages = positive_number(time_step, "time_step"), whole_number(stages, "stages")
-    if time_step >= horizon:
-        raise InvalidInputError(
-            f"time_step = {time_step!r} and stages = {stages!r} do not make a tower below {horizon:g}"
-        )
-    base = (horizon / time_step) ** (1 / stages)
-    if abs(base - round(base)) > 1e-9 * base or round(base) < 2:
-        raise InvalidInputError(f"(horizon/time_step)^(1/stages) = {base:.6g} is not a whole number >= 2")
-    return horizon / round(base) ** stages, round(base), stages

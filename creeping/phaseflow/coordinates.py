@@ -24,8 +24,6 @@ Sources: [YC06b]; Derivations, B2, R15 and R18.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
@@ -36,73 +34,26 @@ from creeping.geometry.evaluators import evaluators, is_compiled, locator, polar
 from creeping.geometry.revolution import charted_axis
 from creeping.geometry.surface import Surface, size
 from creeping.kernels.threads import in_threads, pause
-from creeping.phaseflow.coordinates.rotation import AngleModel, OctantModel, RotationModel, quaternions
+from creeping.phaseflow.rotation import AngleModel, CompiledModel, OctantModel, RotationModel, quaternions
 from creeping.phaseflow.splines import Grid, Leap
-
-TOGETHER = 1000
-"""Leaps between which the kernel comes up for signals, 0.1 s for a block."""
-PROJECTION = 1e-13
-"""Distance from the body, in units of its size, at which a composed ray counts as on it."""
-
-
-class Model(Protocol):
-    """What a map needs of its coordinates; see the module head."""
-
-    @property
-    def body(self) -> Surface:
-        """The body whose flow it is."""
-        ...
-
-    @property
-    def name(self) -> str:
-        """What stored maps call it."""
-        ...
-
-    @property
-    def lanes(self) -> int:
-        """Numbers stored for a displacement."""
-        ...
-
-    @property
-    def charts(self) -> int:
-        """Charts of the grid."""
-        ...
-
-    @property
-    def periodic(self) -> tuple[bool, bool]:
-        """Whether u and v of the charts have period 1."""
-        ...
-
-    @property
-    def is_flat(self) -> bool:
-        """Whether displacements do not depend on u."""
-        ...
-
-    @property
-    def unit(self) -> float:
-        """Error of (x, p), x in body sizes, that an error of 1 of a displacement makes at most."""
-        ...
-
-    def at(self, chart: int, u: FloatArray, v: FloatArray, angle: FloatArray) -> FloatArray:
-        """Coordinates of points of a chart, u and v in [0, 1] on its square, angle in radians: (n,) x 3 -> (n, k)."""
-        ...
-
-    def states(self, coordinates: FloatArray) -> FloatArray:
-        """Points and directions: (n, k) -> (n, 6)."""
-        ...
-
-    def displacement(self, nodes: FloatArray, traced: FloatArray, times: FloatArray) -> FloatArray:
-        """Stored quantity of the last of the traced states (n, m, 6 or more), followed to it: (n, lanes)."""
-        ...
-
-    def flow(self, grid: Grid, leap: Leap, states: FloatArray, counts: IntArray) -> FloatArray:
-        """Compose counts[0], then counts[1], ... maps on states (n, 6, 10 or 12): (n, m, the same)."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
 class AmbientModel:
-    """(x, p) in space, charts as the atlas gives them."""
+    """(x, p) in space, charts as the atlas gives them.
+
+    Attributes
+    ----------
+    body : Surface
+    name : str
+        What stored maps call it.
+    lanes : int
+        Numbers stored for a displacement.
+    is_flat : bool
+        Whether displacements do not depend on u.
+    unit : float
+        Error of (x, p), x in body sizes, that an error of 1 of a displacement makes at most.
+    """
 
     body: Surface
     name: str = "ambient"
@@ -133,7 +84,7 @@ class AmbientModel:
         return first, second
 
     def at(self, chart: int, u: FloatArray, v: FloatArray, angle: FloatArray) -> FloatArray:
-        """See `Model`; coordinates are states."""
+        """Coordinates of points of a chart, u and v in [0, 1] on its square, angle in radians: (n,) x 3 -> (n, 6)."""
         one = self.body.atlas.charts[chart]
         uv = np.stack([u, v], axis=-1)
         frame = polar_frame(one.tangents(uv))
@@ -145,35 +96,38 @@ class AmbientModel:
         return coordinates
 
     def displacement(self, nodes: FloatArray, traced: FloatArray, times: FloatArray) -> FloatArray:
-        """x' - x - t p and p' - p, padded to eight lanes: (n, 8)."""
+        """x' - x - t p and p' - p of the last of the traced states (n, m, 6 or more), padded to eight lanes: (n, 8)."""
         values = np.zeros((len(nodes), 8))
         values[:, :6] = traced[:, -1, :6] - nodes
         values[:, :3] -= times[-1] * nodes[:, 3:]
         return values
 
     def flow(self, grid: Grid, leap: Leap, states: FloatArray, counts: IntArray) -> FloatArray:
-        """See `Model`."""
+        """Compose counts[0], then counts[1], ... maps on states (n, 6 or 10): (n, m, the same)."""
+        from creeping.phaseflow.kernels.composition import leap_in_space
+
         current = np.array(states, dtype=float, order="C")
         out = np.empty((len(states), len(counts), states.shape[1]))
-        for k, count in enumerate(counts):
-            self._compose(grid, leap, current, int(count))
-            out[:, k] = current
-        return out
-
-    def _compose(self, grid: Grid, leap: Leap, states: FloatArray, count: int) -> None:
-        from creeping.phaseflow.kernels.ambient import leap as kernel
-
-        off = PROJECTION * size(self.body)
+        # so near a composed ray counts as on the body
+        off = 1e-13 * size(self.body)
         tables = leap.state, leap.jacobi, grid.degree, grid.origin, grid.cells
         with evaluators(self.body) as parts, locator(self.body) as place:
+            for k, count in enumerate(counts.tolist()):
 
-            def run(part: slice) -> None:
-                # a map composed with itself in place may be left in between
-                for done in range(0, count, TOGETHER):
-                    kernel(*place, *parts[:2], *tables, leap.time, min(TOGETHER, count - done), off, states[part])
-                    pause()
+                def run(part: slice, count: int = count) -> None:
+                    # a map composed with itself in place may be left in between, every 0.1 s for a block
+                    for done in range(0, count, 1000):
+                        some = min(1000, count - done)
+                        leap_in_space(*place, *parts[:2], *tables, leap.time, some, off, current[part])
+                        pause()
 
-            in_threads(run, len(states))
+                in_threads(run, len(current))
+                out[:, k] = current
+        return out
+
+
+Model = AmbientModel | CompiledModel
+"""What a map needs of its coordinates: the same attributes and methods; see the module head."""
 
 
 def nodes_of(model: Model, grid: Grid) -> FloatArray:
@@ -217,7 +171,7 @@ class MeridianModel(RotationModel):
     """Rotations on a body of revolution that is an image of the sphere: one chart, the meridian from pole to pole.
 
     u is the azimuth in turns, v = theta/pi with theta the angle from the axis on the sphere; see
-    `phaseflow.kernels.meridian`.
+    `phaseflow.kernels.surface_table.locate_meridian`.
     """
 
     name = "meridian"
@@ -232,16 +186,12 @@ class MeridianModel(RotationModel):
         assert axis is not None
         self.axis = axis
 
-    @cached_property
-    def _surface_table(self) -> FloatArray:
-        return RotationModel(self.body)._surface_table
-
     def placement(self, grid: Grid) -> tuple[FloatArray, FloatArray]:
         """See `CompiledModel`; the axis follows the shift."""
         return grid.cells, np.array([*grid.origin, 0.0, *self.axis])
 
     def at(self, chart: int, u: FloatArray, v: FloatArray, angle: FloatArray) -> FloatArray:
-        """See `Model`; v beyond [0, 1] goes on over the pole."""
+        """As for all models; v beyond [0, 1] goes on over the pole."""
         first, second = tangent_frames(self.axis)
         azimuth, theta, angle = (np.asarray(t)[..., None] for t in (2 * np.pi * u, np.pi * np.asarray(v), angle))
         outwards = np.cos(azimuth) * first + np.sin(azimuth) * second

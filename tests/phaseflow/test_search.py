@@ -5,11 +5,10 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.geodesics.bundle import random_bundle_points
 from creeping.geodesics.integrator import trace_states
-from creeping.geodesics.states import pack
+from creeping.geodesics.states import pack, random_bundle_points
 from creeping.kernels.threads import thread_count
-from creeping.phaseflow.coordinates import rotation as compiled_models
+from creeping.phaseflow import rotation as compiled_models
 
 
 def rms_at_end(flow, body, length, rng, rays=1000):

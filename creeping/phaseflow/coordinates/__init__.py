@@ -1,1 +1,0 @@
-"""Coordinates of the unit tangent bundle in which maps are stored and composed."""
