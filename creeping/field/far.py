@@ -54,7 +54,7 @@ from creeping.rays.uncertain_body import coarse_factor, coarse_fan
 from creeping.storage.memory import blocks, within_budget
 from creeping.storage.parts import Keeping, not_kept
 
-LEAST_BYTES, KEPT_BYTES, RAY_BYTES, FAN_BYTES = 250.0, 1000.0, 33_000.0, 200.0
+LEAST_BYTES, KEPT_BYTES, RAY_BYTES, FAN_BYTES = 250.0, 1000.0, 33_000.0, 500.0
 """Of a direction: its field by any way, of a conductor thrice that; by rays, twice while parts are joined; what rays
 take, twice as the geometry of the directions before is kept; and for each k size, the fan integral."""
 

@@ -31,7 +31,7 @@ points and ahead, and n.d has no jump at the shadow line, where the current of a
 
 Each tile is a flat triangle, over which the phase is linear: with phases u and v of two corners relative to the third,
 
-    ∫ e^{iφ} dS = 2A e^{iφ0} (g(u) - g(v))/(i(u - v)),    g(x) = (e^{ix} - 1)/(ix)    (`kernels.triangle_waves`).
+    ∫ e^{iφ} dS = 2A e^{iφ0} (g(u) - g(v))/(i(u - v)),    g(x) = (e^{ix} - 1)/(ix)    (`kernels.bounce.triangle_waves`).
 
 The same integral serves a specular point, a flat facet as a whole, the rim of a facet and the forward lobe. Its error
 on curved ground is of the next order, κ/(k cos³θᵢ) of each tile's contribution.
