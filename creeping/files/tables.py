@@ -15,8 +15,8 @@ from creeping.errors import InvalidInputError
 from creeping.field.results.comparison import LEVELS, cross_section_decibels, decibels, error_decibels
 from creeping.field.results.point_result import FieldStatus
 from creeping.geometry.checks import UNKNOWN, unit_of
-from creeping.rays.fan import RayFan
 from creeping.rays.ends import RayStatus
+from creeping.rays.fan import RayFan
 from creeping.rays.isophase import IsoPhaseCurve
 from creeping.shadow.line import ShadowLine
 from creeping.storage.atomic import written_aside
