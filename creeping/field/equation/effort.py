@@ -101,7 +101,7 @@ def plan_of(
 
 def _plan(body: Surface, wavenumber: float, kind: Boundary, allowed: float, incidences: int, together: bool) -> Plan:
     columns, asked = incidences * kind_columns(kind), (incidences if together else 1) * kind_columns(kind)
-    fewest = int(FEWEST * _area(body) * (wavenumber / (2 * np.pi)) ** 2)
+    fewest = fewest_nodes(body, wavenumber)
     least = near_seconds(fewest, FEWEST_PAIRS * fewest, 1, kind, flat=True)
     plan = Plan(fewest, least, 0.0, f"at least {fewest} nodes take about {least:.2g} s, more than {allowed:g}")
     for coarse in (False, True) if least <= allowed else ():
@@ -153,10 +153,11 @@ def near_seconds(nodes: float, pairs: float, p: int, kind: Boundary, *, flat: bo
     return 2 * (nodes * node + pairs * pair) * vector / thread_count()
 
 
-def _area(body: Surface) -> float:
-    """Area of a body, L^2, by the widest tiles that it has."""
-    wavenumber = 2 * np.pi / size(body)
-    return memo(body, "area", lambda: float(body_tiles(body, wavenumber, HARD, coarse=True).weights.sum()))
+def fewest_nodes(body: Surface, wavenumber: float) -> int:
+    """Nodes that the equation has at least, by the area of the widest tiles that the body has."""
+    widest = 2 * np.pi / size(body)
+    area = memo(body, "area", lambda: float(body_tiles(body, widest, HARD, coarse=True).weights.sum()))
+    return int(FEWEST * area * (wavenumber / (2 * np.pi)) ** 2)
 
 
 def load_of(body: Surface, wavenumber: float, kind: Boundary, *, coarse: bool = False) -> Load:

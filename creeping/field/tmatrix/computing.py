@@ -30,7 +30,7 @@ from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, boundary_name, scalar_boundaries
 from creeping.field.equation.body_tiles import body_tiles
 from creeping.field.equation.currents import inside_points
-from creeping.field.equation.effort import PRODUCTS, Load, load_of, load_on, pair_seconds, plan_of
+from creeping.field.equation.effort import PRODUCTS, Load, fewest_nodes, load_of, load_on, pair_seconds, plan_of
 from creeping.field.equation.matrix import Matrix
 from creeping.field.equation.mirrors import mirrors_of, no_mirrors
 from creeping.field.tmatrix.result import TMatrix
@@ -54,6 +54,10 @@ LEAST = 3
 """Degrees at least."""
 RATE, PER_SUM = 3e10, 4e-9
 """Single-precision operations that LAPACK does in a second on a core, and seconds of a sum over images, about."""
+WAVE_BYTES = 80
+"""Bytes of a wave at a node while all are solved: five complex numbers."""
+LOWER = "lower the wavenumber, or let creeping.solve serve for few incidences"
+"""What else one can do where a T-matrix takes too much."""
 RESULT = "matrix"
 """Part of a store that is left at the end."""
 KEPT = 0.1
@@ -165,6 +169,7 @@ def _computed(
     keep: Keeping,
 ) -> tuple[ComplexArray, float]:
     """The matrix, and what is left of plane waves inside the body."""
+    within_budget(_least_bytes(body, k, kind, order), f"the T-matrix at wavenumber {k:g}", LOWER)
     tiles = body_tiles(body, FINER * k, kind)
     radius = float(np.max(np.linalg.norm(tiles.points - middle, axis=1)))
     degree = order_for(k * radius) if order is None else order
@@ -206,7 +211,7 @@ def plan_for(load: Load, kind: Boundary, order: int, parts: int = 1) -> Plan:
     nodes, c = load.nodes, 2 if kind.kind == "conductor" else 1
     n, waves = float(c * nodes), float(vector_count(order) if c == 2 else count(order))
     # values of all waves, waves at the nodes of a part, and the matrix itself
-    tables = 8 * n * waves + 80 * n * waves / parts + 64 * waves**2 + 2e4 * n
+    tables = 8 * n * waves + WAVE_BYTES * n * waves / parts + 64 * waves**2 + 2e4 * n
     memory = 8 * n**2 / parts + tables
     if memory <= DENSE * budget():
         own, each = n / parts, waves / parts
@@ -214,17 +219,30 @@ def plan_for(load: Load, kind: Boundary, order: int, parts: int = 1) -> Plan:
         added = 2 * n**2 / parts * (2 + np.log2(parts)) * PER_SUM
         made = (pair_seconds(nodes, kind) + load.near) / parts
         return Plan(made + (parts * solved / RATE + added) / thread_count(), memory, True)
-    return Plan(load.seconds + PRODUCTS * waves * load.product, max(load.memory, 80 * n * waves + 2e4 * n), False)
+    memory = max(load.memory, WAVE_BYTES * n * waves + 2e4 * n)
+    return Plan(load.seconds + PRODUCTS * waves * load.product, memory, False)
 
 
 def expected(body: Surface, wavenumber: float, boundary: BoundaryLike) -> Plan:
     """What the T-matrix of a body takes, by the nodes that its equation has."""
     kinds = scalar_boundaries(boundary)
     kind = CONDUCTOR if len(kinds) == 2 else kinds[0]
-    radius = 0.5 * float(np.linalg.norm(np.ptp(np.asarray(body.bounds, dtype=float), axis=0)))
-
+    if (least := _least_bytes(body, wavenumber, kind, None)) > budget():
+        return Plan(np.inf, least, False)
     load = load_of(body, FINER * wavenumber, kind)
-    return plan_for(load, kind, order_for(wavenumber * radius), load.parts)
+    return plan_for(load, kind, order_for(wavenumber * _radius(body)), load.parts)
+
+
+def _radius(body: Surface) -> float:
+    """Half the diagonal of the body's box, L."""
+    return 0.5 * float(np.linalg.norm(np.ptp(np.asarray(body.bounds, dtype=float), axis=0)))
+
+
+def _least_bytes(body: Surface, wavenumber: float, kind: Boundary, order: int | None) -> float:
+    """Bytes of all waves at the fewest nodes, known before there are tiles; mirrors part a body into eight at most."""
+    degree = order_for(wavenumber * _radius(body)) if order is None else order
+    waves = 2 * vector_count(degree) if kind.kind == "conductor" else count(degree)
+    return (8 + WAVE_BYTES / 8) * waves * fewest_nodes(body, FINER * wavenumber)
 
 
 def refuse(body: Surface, wavenumber: float, boundary: BoundaryLike, order: int | None, seconds: float) -> None:
@@ -234,7 +252,7 @@ def refuse(body: Surface, wavenumber: float, boundary: BoundaryLike, order: int 
 
 
 def _refuse(plan: Plan, what: str, seconds: float) -> None:
-    within_budget(plan.memory, what, "lower the wavenumber, or let creeping.solve serve for few incidences")
+    within_budget(plan.memory, what, LOWER)
     if plan.seconds > seconds:
         raise InvalidInputError(
             f"{what} takes about {plan.seconds:.2g} s, more than the {seconds:g} s that it may take; give seconds=, "
