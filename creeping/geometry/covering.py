@@ -10,18 +10,17 @@ So surfaces of neighbours meet without a gap. A triangle is a square whose side 
 has one. A smooth body's squares are those of its charts, where these cover it once (``tiling``). A square that is not
 the body to POSITION and NORMAL is halved.
 
-Also here: a coarse mesh of a body, of quadrilaterals and triangles: where its squares begin
-(`creeping.geometry.covering`).
-
-Of a smooth body the quadrilaterals around the grid edges that it crosses; of one of pieces its triangles, joined by two
-where they make a good quadrilateral: convex, its corners no sharper than SQUARE, and no two sides in a row along one
-crease, between which there is no corner.
+The coarse mesh has the quadrilaterals around the grid edges that a smooth body crosses; of a body of pieces its
+triangles, joined by two where they make a good quadrilateral: convex, its corners no sharper than SQUARE, and no two
+sides in a row along one crease, between which there is no corner.
 
 Sources: [C67], [BT04]; Derivations, B14.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -43,17 +42,14 @@ ROUNDS, TURNS, PARTS = 5, 2.0, 2
 """Times that a square is parted at most, and ratio of the turns of its normal from which it is along one side; and
 parts along a side of a chart before."""
 BETTER = 0.5
-"""What may be amiss of a part, over what was of the whole, at most: else it is not parted again."""
+"""What may be amiss of a part over what was of the whole: else it is not parted again."""
 SIDES_OF_PIECES = (1.0, 0.7, 0.5, 0.3)
 """Longest sides of the triangles of a body of pieces, in its sizes, of the meshes that are tried."""
 WELL, CLOSED = 1e-5, 1e-6
 """What squares may be off the body, in its sizes, and the integral of n over them, as a share of the area: more counts
 against a mesh."""
-STEEP = 0.2
-"""Sine of the angle between x_u and x_v, at least: less counts against a mesh."""
-NEWTON = 20
-"""Steps onto a crease."""
-
+STEEP, NEWTON = 0.2, 20
+"""Sine of the angle between x_u and x_v, at least: less counts against a mesh; and steps onto a crease."""
 CELLS = (3, 4, 5, 6, 8, 12, 24)
 """Cells of the meshes of a smooth body; the first that is of the kind of the last is taken."""
 SQUARE = 0.8
@@ -65,7 +61,7 @@ MOST = 4000
 
 
 class CoarseMesh(NamedTuple):
-    """Corners of squares at (0, 0), (1, 0), (1, 1), (0, 1); the first is the last again of a triangle.
+    """Corners of squares at (0, 0), (1, 0), (1, 1), (0, 1); of a triangle the first is the last again.
 
     ``places`` are points of the squares (m, n, n, 3) at Lobatto's, of a body that knows them.
     """
@@ -80,9 +76,15 @@ def coarse_mesh(body: Any, share: float) -> CoarseMesh:
     """A coarse mesh of a body, of pieces with sides of a share of its size."""
     if not is_piecewise(body):
         given = body.level, body.gradient, body.bounds
-        meshes = [quadrilaterals(*given, cells=n, fewest=min(n, 24), mirrored=True) for n in CELLS]
-        kinds = [len(vertices) - len(tiles) for vertices, tiles in meshes]
-        vertices, tiles = meshes[kinds.index(kinds[-1])]
+        *coarser, finest = (partial(quadrilaterals, *given, cells=n, fewest=min(n, 24), mirrored=True) for n in CELLS)
+        vertices, tiles = finest()
+        for mesh in coarser:
+            # a thin body may pass between the points of a coarse grid
+            with suppress(SurfaceError):
+                found = mesh()
+                if len(found[0]) - len(found[1]) == len(vertices) - len(tiles):
+                    vertices, tiles = found
+                    break
         return CoarseMesh(vertices, tiles, np.zeros(len(tiles), dtype=np.int64))
     corners, _, pieces = body.tiles(share * size(body))
     if len(corners) > MOST:

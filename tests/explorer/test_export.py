@@ -76,7 +76,7 @@ def test_a_notebook_holds_the_page(tmp_path, browser):
 
 
 def test_the_command_writes_it_and_names_are_titles(tmp_path, capsys):
-    assert title_of("some/where/hull.stl") == "hull.stl" and len(title_of("x + " * 100)) == 60
+    assert title_of("some/where/hull.stl") == "hull.stl" and len(title_of("x + " * 100)) == 40
     with pytest.raises(SystemExit) as caught:
         arguments = ["--rays", "16", "--frequency", "1GHz", "--boundary", "pec", "--export", str(tmp_path / "a.html")]
         cli.main(["explore", "sphere", *arguments])

@@ -13,9 +13,12 @@ from creeping.geometry.covering import patches_of
 HALF = 25 * 29 / 150 * (np.sqrt(1 - (np.linspace(0, 7 / 25, 2001)) ** 2) - 0.96)
 ALMOND = np.pi / 3 * (2 / 3 * 5 / 12 * (29 / 150) ** 2 + np.trapezoid(HALF**2, dx=7 / 12 / 2000))
 """Volume of half an ellipsoid and of a half ogive whose cross-sections are ellipses."""
+RING, AROUND = "(x**2+y**2+z**2+0.96)**2 - 4*(x**2+y**2+z**2 - (0.48*x+0.6*y+0.64*z)**2)", (1.0773, 1.0, 0.9684)
+"""A slender torus, R = 1, r = 0.2, about (0.48, 0.6, 0.64), and its box: coarse grids have no point within it."""
 BODIES = {
     "sphere": (lambda: sc.Sphere(1.5), 9 * np.pi, 4.5 * np.pi),
     "torus": (lambda: sc.Torus(R=1.0, r=0.4), 1.6 * np.pi**2, 0.32 * np.pi**2),
+    "slender": (lambda: sc.Implicit(RING, bounds=(-np.array(AROUND), AROUND)), 0.8 * np.pi**2, 0.08 * np.pi**2),
     "cylinder": (lambda: sc.Cylinder(0.5, 2.0), 2.5 * np.pi, 0.5 * np.pi),
     "cone": (lambda: sc.Cone(1.0, 2.0), np.pi * (1 + 5**0.5), 2 / 3 * np.pi),
     "capsule": (lambda: sc.Capsule(0.5, 3.0), 3 * np.pi, 2 / 3 * np.pi),
