@@ -131,15 +131,11 @@ def teller(progress: Any) -> Callable[[str], None]:
         return _show
     if progress is not None and progress is not False and not callable(progress):
         raise TypeError(f"progress = {progress!r} cannot be called; give True or a function of one text")
-    return progress or _ignore
+    return progress or (lambda _: None)
 
 
 def _show(text: str) -> None:
     print(f"scatterers: {text}", file=sys.stderr)
-
-
-def _ignore(text: str) -> None:
-    pass
 
 
 @dataclass(frozen=True, eq=False)

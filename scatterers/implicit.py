@@ -114,7 +114,8 @@ class Implicit(LevelBody):
             self.__class__ = PiecewiseImplicit
 
     def _tips(self, samples: Samples, strict: bool) -> FloatArray:
-        points, spacing, size = samples.crossings(), float(samples.spacing.max()), self._diagonal
+        points, spacing = samples.crossings(), float(samples.spacing.max())
+        size = float(np.linalg.norm(self._bounds[1] - self._bounds[0]))
         flat = singular_points(self.compiled, points, size)
         if len(flat) > 8:
             raise ValueError(
@@ -182,10 +183,6 @@ class Implicit(LevelBody):
         if sphere_map is None and centre is not None:
             raise ValueError(failure)
         self._place(space, samples, sphere_map)
-
-    @property
-    def _diagonal(self) -> float:
-        return float(np.linalg.norm(self._bounds[1] - self._bounds[0]))
 
     def __repr__(self) -> str:
         return f"Implicit({self.expression!r}, speed={self.speed!r})"
@@ -375,11 +372,10 @@ def _checked(samples: ArrayLike) -> FloatArray:
         raise ValueError(f"{bad} of {nodes.size} samples are not finite; give F at every node, also far away")
     if not np.any(nodes < 0):
         raise ValueError(f"none of {nodes.size} samples is negative: no body; give F < 0 inside, or more nodes")
-    edge = np.ones(nodes.shape, dtype=bool)
-    edge[1:-1, 1:-1, 1:-1] = False
-    if bad := int(np.sum(~(nodes[edge] > 0))):
+    faces = Samples(nodes, np.zeros(3), np.ones(3)).on_faces()
+    if bad := int(np.sum(~(faces > 0))):
         raise ValueError(
-            f"F <= 0 at {bad} of {edge.sum()} nodes on the grid's faces: the body leaves the grid or F is negative "
+            f"F <= 0 at {bad} of {len(faces)} nodes on the grid's faces: the body leaves the grid or F is negative "
             "outside; widen the box or change the sign"
         )
     return nodes

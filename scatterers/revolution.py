@@ -125,7 +125,7 @@ def _segments(profile: Any, corners: Iterable[int]) -> list[Segment]:
 
 def _between(points: FloatArray, may_be_poles: tuple[bool, bool]) -> Segment:
     """Line or spline from corner to corner."""
-    # radians from a right angle to the axis within which an end is a smooth pole
+    # within so many radians of a right angle to the axis an end is a smooth pole
     limit = 0.05
     if len(points) == 2:
         (z0, r0), (z1, r1) = points.tolist()

@@ -136,8 +136,8 @@ def occluded(body: Surface, points: FloatArray, direction: FloatArray, reach: Fl
 
     Points lie on the body, where it is lit or touched from outside, or above it.
     """
-    # rays at a time
-    slice_of = 256
+    # so many rays at a time
+    together = 256
     hidden = np.zeros(len(points), dtype=bool)
     d, limit = np.broadcast_to(direction, points.shape), np.broadcast_to(reach, len(points))
     low, high = np.asarray(body.bounds, dtype=float)
@@ -147,8 +147,8 @@ def occluded(body: Surface, points: FloatArray, direction: FloatArray, reach: Fl
     step = np.minimum(np.maximum(out, 0.5e-3 * np.linalg.norm(high - low)), limit) / SAMPLES
 
     def run(slice_: slice) -> None:
-        for start in range(slice_.start, slice_.stop, slice_of):
-            some(slice(start, min(start + slice_of, slice_.stop)))
+        for start in range(slice_.start, slice_.stop, together):
+            some(slice(start, min(start + together, slice_.stop)))
 
     def some(part: slice) -> None:
         x, back, h = points[part], d[part], step[part, None]
@@ -161,7 +161,7 @@ def occluded(body: Surface, points: FloatArray, direction: FloatArray, reach: Fl
             under = _dips(body, x[row], back[row], t[row, sample + 1], h[row, 0])
             hidden[part.start + row[under]] = True
 
-    in_slices(run, len(points), multiple=slice_of)
+    in_slices(run, len(points), multiple=together)
     return hidden
 
 

@@ -169,10 +169,8 @@ class _Walk:
 
     def _followed(self, start: FloatArray, T0: FloatArray, sign: float) -> tuple[FloatArray, bool, int, float]:
         """Nodes from the start along sign T, whether they come round, the crease they end at, and the gap to it."""
-        # in body sizes
-        longest = 0.04
-        # nodes of a curve at most
-        most = 20_000
+        # step in body sizes, and nodes
+        longest, most = 0.04, 20_000
         nodes, T, h = [start], T0, longest * self.size
         while len(nodes) < most:
             x = nodes[-1]

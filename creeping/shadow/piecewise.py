@@ -193,13 +193,10 @@ def _joined(body: Any, curves: list[ShadowCurve]) -> tuple[ShadowCurve, ...]:
         gaps = [float(np.linalg.norm(curves[k].points[-side_] - x)) for k, side_ in others]
         if gaps and min(gaps) < MEET * size(body):
             goes_on[number, side] = others[int(np.argmin(gaps))][0]
-    out = []
-    for number, curve in enumerate(curves):
-        if curve.closed:
-            out.append(curve)
-            continue
-        out.append(replace(curve, goes_on=(goes_on[number, 0], goes_on[number, 1])))
-    return tuple(out)
+    return tuple(
+        curve if curve.closed else replace(curve, goes_on=(goes_on[number, 0], goes_on[number, 1]))
+        for number, curve in enumerate(curves)
+    )
 
 
 def launched_from(curves: tuple[ShadowCurve, ...], arcs: list[Arc], direction: FloatArray, n_rays: int) -> LaunchPoints:

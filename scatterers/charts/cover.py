@@ -327,10 +327,9 @@ def covered_by(
     ValueError
         If no cover is found; with how much is left.
     """
-    # distance of candidates in radii of curvature
-    apart = 0.25
     cloud = _Cloud.of(level, gradient, hessian, points)
-    candidates = _Candidates(cloud, margin)
+    # distance of candidates in radii of curvature
+    candidates, apart = _Candidates(cloud, margin), 0.25
     fresh, before = cloud.spread(np.arange(len(points)), apart), len(points)
     for _ in range(12):
         candidates.add(fresh, np.full(len(fresh), np.inf))

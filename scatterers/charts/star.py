@@ -232,7 +232,7 @@ def _hidden(sphere_map: RadialMap, points: FloatArray) -> str:
     inside = np.all(centre > box[0]) and np.all(centre < box[1])
     if not inside or not evaluated(sphere_map.compiled_level, centre)[0] < 0:
         return f"the centre {where} is not inside the body; {remedy}"
-    # 20 000 tell
+    # at 20 000 of them
     points = points[:: -(-len(points) // 20_000)]
     hidden = int(np.sum(~(sphere_map.facing(points) > 0)))
     if not hidden:
@@ -443,7 +443,7 @@ class LevelBody(Levelled, Body):
                 # fewer charts than with a larger margin, for maps of at least 15 nodes a side
                 return MongeAtlas.covering(self.level, self.gradient, self.hessian, cloud, margin=0.4)
             except ValueError as error:
-                # parts may be finer than so few points
+                # parts may be finer than the points
                 failure = str(error)
         # to find that out takes as long as charts do
         self._no_charts = f"the body is too thin, or too sharply curved, in places for charts: {failure}"

@@ -279,9 +279,8 @@ class Revolved(Levelled, Body):
         return found._replace(vertices=self._placed(found.vertices), places=self._placed(found.places))
 
     def _normal(self, local: FloatArray) -> FloatArray:
-        iu, iv, iw = self._axes
-        n = np.empty(local.shape)
-        n[..., iu], n[..., iv], n[..., iw] = local[..., 0], local[..., 1] * self._stretch, local[..., 2]
+        # stretched where points are drawn together
+        n = self._placed(local * np.array([1.0, self._stretch**2, 1.0]))
         return np.asarray(n / np.linalg.norm(n, axis=-1, keepdims=True))
 
     @cached

@@ -340,7 +340,7 @@ def _take_sides(
     order = np.argsort(np.abs(ahead), kind="stable")
     vertex, nearest = np.unique(vertex[order], return_index=True)
     ahead, x = ahead[order[nearest]], x[order[nearest] % len(where)]
-    # parts of the edge; rather than that slivers are cut off
+    # near in parts of the edge, rather than that slivers are cut off
     on = np.abs(ahead) < 0.1
     points[vertex[on]] = x[on]
     held[np.ix_(vertex[on], pair)] = True

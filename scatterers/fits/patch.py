@@ -159,7 +159,7 @@ def polynomial_through(
         # a quadric may be a pair of sheets, of which the points take one
         curved = 2e-4 * bend / float(np.median(steep)) * half / 8 if kind == "quadric" else 0.0
         slope = steep / np.median(steep)
-        # normals of triangles lean from those of a quadric through their corners
+        # normals of triangles lean by so many radians from those of a quadric through their corners
         least = np.select([slope > SLIGHT, slope > TIP], [np.cos(0.35), 0.0], -1.0)
         if np.all(off <= max(tolerance, curved)) and np.all(lean >= least) and np.sum(slope <= TIP) <= 1:
             return _as_spline(q / np.median(steep), powers, middle, half), kind, float(np.sqrt(np.mean(off**2)))

@@ -72,7 +72,7 @@ def doubtful(patch: Patch, x: FloatArray, normals: FloatArray) -> FloatArray:
         return np.zeros((0, 3))
     gradient = patch.fine.gradient(x)
     turn = np.linalg.norm(gradient / np.linalg.norm(gradient, axis=1, keepdims=True) - normals, axis=1)
-    # by radians that a fit does not have, or some times what is usual: coarse triangles err, too
+    # more than 0.05 radians, or six times what is usual: coarse triangles err, too
     return np.asarray(x[~(turn <= max(0.05, 6.0 * float(np.median(turn))))])
 
 

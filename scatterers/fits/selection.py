@@ -370,7 +370,7 @@ def _osculating(curve: Crease, across: FloatArray) -> FloatArray:
     normal = np.cross(_unit(along), bend)
     turn = np.linalg.norm(normal, axis=1)
     normal = _unit(normal) * np.copysign(1.0, np.sum(normal * across, axis=1))[:, None]
-    # radians over three segments; and the cosine to the plane at right angles to the body
+    # not straight, radians over three segments, no kink, and by its cosine not nearly touching the body
     sound = (turn > 1e-3) & (turn < 0.8) & (np.sum(normal * across, axis=1) > 0.5)
     return np.where(sound[:, None], normal, across)
 

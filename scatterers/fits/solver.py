@@ -155,7 +155,7 @@ def fit(
             kept = c.copy()
         elif done > checked:
             break
-        # surfaces that are less smooth than their grid go on changing a little
+        # over two looks: surfaces that are less smooth than their grid go on changing a little
         if change <= accuracy * scale or (keep_start and change > 0.7 * changes[-2]):
             break
         changes.append(change)

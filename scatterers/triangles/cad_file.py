@@ -42,6 +42,8 @@ from scatterers.triangles.topology import Edges, cleaned, edges_of, flat_normals
 SUFFIXES = {".step": "STEP", ".stp": "STEP", ".iges": "IGES", ".igs": "IGES", ".brep": "BREP"}
 POINTS = 10_000
 """Points of the body that are asked for."""
+TIMEOUT = 600
+"""Of gmsh, s."""
 SHARP = 2.0
 """Degrees between the normals of two faces at a common point that make an edge."""
 
@@ -286,9 +288,9 @@ def _meshed(path: Path, points: int, sew: float | None, curved: int) -> dict[str
         command = [sys.executable, "-P", str(worker), str(path.resolve()), str(points), str(out)]
         command += [str(curved), repr(1e3 * float(sew or 0.0))]
         try:
-            done = subprocess.run(command, capture_output=True, timeout=600, check=False, text=True)
+            done = subprocess.run(command, capture_output=True, timeout=TIMEOUT, check=False, text=True)
         except subprocess.TimeoutExpired:
-            raise ValueError(f"{path.name}: gmsh did not mesh it within 600 s; simplify the body") from None
+            raise ValueError(f"{path.name}: gmsh did not mesh it within {TIMEOUT} s; simplify the body") from None
         if done.returncode or not out.exists():
             lines = [line for line in (done.stderr or "").splitlines() if line.strip()]
             if "libGL" in done.stderr or "cannot open shared object" in done.stderr:

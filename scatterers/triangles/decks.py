@@ -13,6 +13,7 @@ import re
 import zlib
 from collections.abc import Callable, Iterator
 from itertools import islice
+from pathlib import Path
 
 import numpy as np
 
@@ -239,7 +240,7 @@ def understood(name: str, suffix: str, data: bytes, limit: int, note: Note) -> t
         rb"(\0[\t\n\r -~]){16}": "utf-16-be",
     }
     if data.startswith(b"\x1f\x8b"):
-        data, suffix = _unpacked(name, data, limit), _ending(name.lower().removesuffix(".gz"))
+        data, suffix = _unpacked(name, data, limit), Path(name.lower().removesuffix(".gz")).suffix
     if encoding := next((code for sign, code in utf16.items() if re.match(sign, data)), None):
         data = data.decode(encoding, "replace").encode()
     data = data.removeprefix(b"\xef\xbb\xbf")
@@ -277,10 +278,6 @@ def what_kind(name: str, suffix: str, data: bytes) -> str:
 def what_else(data: bytes) -> str | None:
     """What a file is that is no mesh, and what to do about it; None if it is not known."""
     return next((what for sign, what in OTHERS.items() if re.match(sign, data[:HEAD], re.IGNORECASE)), None)
-
-
-def _ending(name: str) -> str:
-    return f".{name.rpartition('.')[2]}" if "." in name else ""
 
 
 def _unpacked(name: str, data: bytes, limit: int) -> bytes:

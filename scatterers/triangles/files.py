@@ -126,7 +126,9 @@ def _one_body(
 ) -> tuple[FloatArray, IntArray, FloatArray, FloatArray]:
     """Vertices and triangles of a closed surface, the middle of its box, and the vertices relative to that."""
     vertices, triangles = cleaned(raw.name, raw.vertices, chosen, note if raw.indexed else silent, note)
-    _check_size(raw.name, vertices, scale)
+    size = float(np.ptp(vertices, axis=0).max()) * scale
+    if not 1e-9 <= size <= 1e9:
+        raise ValueError(f"{raw.name} is {size:.3g} m large; give the right units, or a body from 1e-09 to 1e+09 m")
     vertices, triangles = whole_body(
         raw.name, vertices, triangles, choice, scale, note, named=chosen is not raw.triangles
     )
@@ -330,12 +332,6 @@ def _unit(raw: _Raw, given: str | None, otherwise: str | None) -> str:
             f'millimetres; give the unit, e.g. units="mm", or one of {", ".join(UNITS)}'
         )
     return unit
-
-
-def _check_size(name: str, vertices: FloatArray, scale: float) -> None:
-    size = float(np.ptp(vertices, axis=0).max()) * scale
-    if not 1e-9 <= size <= 1e9:
-        raise ValueError(f"{name} is {size:.3g} m large; give the right units, or a body from 1e-09 to 1e+09 m")
 
 
 def _check_rounding(name: str, vertices: FloatArray, triangles: IntArray, *, torn: bool = False) -> None:

@@ -131,7 +131,7 @@ class MeshQuality:
         rows = [
             ("verdict", self.verdict),
             ("vertices, triangles", f"{self.vertices}, {self.triangles}"),
-            ("size", _metres(self.size)),
+            ("size", " x ".join(f"{v:.4g}" for v in self.size) + " m"),
             ("edge mean, min, max", f"{self.edge_mean:.4g}, {self.edge_min:.4g}, {self.edge_max:.4g} m"),
             ("dihedral 50 %, 99 %, max", f"{d[0]:.3g}, {d[1]:.3g}, {d[2]:.3g} degrees"),
             ("curvature x edge 99 %", f"{self.curvature:.3g}"),
@@ -147,10 +147,6 @@ class MeshQuality:
             rows.insert(3, ("", " x ".join(f"{v:.4g}" for v in waves) + " wavelengths"))
             rows.insert(5, ("", f"{self.edge_mean * wavenumber / (2 * np.pi):.3g} wavelengths on average"))
         return "\n".join([f"{name:26s} {value}" for name, value in rows] + [self.reasons])
-
-
-def _metres(size: FloatArray) -> str:
-    return " x ".join(f"{v:.4g}" for v in size) + " m"
 
 
 def assess(vertices: FloatArray, triangles: IntArray, jets: Jets) -> MeshQuality:

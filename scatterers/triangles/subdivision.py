@@ -128,14 +128,9 @@ def unseen(source: Source, turn: FloatArray, principal: FloatArray, gauss: Float
     Vertices at which it shows nothing at all are left out.
     """
     values = np.column_stack([principal, gauss])
-    left = np.maximum(1.0, turn**2)[:, None] * (values - _mean_of_neighbours(values, source.edges))
+    first, last = np.concatenate([source.edges, source.edges[:, ::-1]]).T
+    total = np.stack([np.bincount(first, one[last], minlength=len(values)) for one in values.T], axis=1)
+    of_neighbours = total / np.bincount(first, minlength=len(values))[:, None]
+    left = np.maximum(1.0, turn**2)[:, None] * (values - of_neighbours)
     left = left[turn <= BLIND]
     return float(np.sqrt(np.mean(left[:, :2] ** 2))), float(np.sqrt(np.mean(left[:, 2] ** 2)))
-
-
-def _mean_of_neighbours(values: FloatArray, edges: IntArray) -> FloatArray:
-    """Mean over the neighbours of each vertex, (n, c) -> (n, c)."""
-    first, last = np.concatenate([edges, edges[:, ::-1]]).T
-    count = np.bincount(first, minlength=len(values))
-    total = np.stack([np.bincount(first, one[last], minlength=len(values)) for one in values.T], axis=1)
-    return np.asarray(total / count[:, None])

@@ -77,7 +77,7 @@ def lines_on_mesh(
             continue
         some = first[curves]
         step = move(level, level_par, wave, raw[:some], reach, once, space, slopes, bent, left)
-        # crossings that go farther may have changed branch: the line takes more steps, and is flagged
+        # crossings that go farther, in edges, may have changed branch: the line takes more steps, and is flagged
         sure = step < 0.22 * edge
         more = once if sure else 4 * once
         if not move(level, level_par, wave, raw[:some], reach, more, space, slopes, bent, left) < math.inf:
@@ -97,7 +97,7 @@ def lines_on_mesh(
                 good = whole < math.inf
         if good:
             found[row], error[row] = curves, off / whole
-            # by its length of orders 4 and 6, and of 8 and 12
+            # its length differs so little by orders 4 and 6, and by 8 and 12
             certain[row] = sure and not leans and rough < 2e-6 * whole and off < 1e-7 * whole
 
 
