@@ -28,11 +28,8 @@ if TYPE_CHECKING:
 else:
     cached = cached_property
 
-MOST_NUMBERS = 10**9
 SHARP = ("edge", "tip")
 """Kinds of creases that no smooth chart covers."""
-LONGEST = 120
-"""Characters of a body's text in its table."""
 
 
 def finite(**values: float) -> None:
@@ -61,8 +58,8 @@ def numbers(values: ArrayLike) -> FloatArray:
         If they are no numbers, or more of them than an array is made of.
     """
     count = values.size if isinstance(values, np.ndarray) else len(values) if isinstance(values, Sized) else 0
-    if count > MOST_NUMBERS:
-        raise ValueError(f"{count} numbers are more than {MOST_NUMBERS}")
+    if count > 10**9:
+        raise ValueError(f"{count} numbers are more than {10**9}")
     try:
         return np.asarray(values, dtype=float)
     except (OverflowError, RecursionError) as error:
@@ -93,6 +90,13 @@ def polar_angles(s: FloatArray) -> FloatArray:
     return np.stack([np.arctan2(np.hypot(s[..., 0], s[..., 1]), s[..., 2]), np.arctan2(s[..., 1], s[..., 0])], axis=-1)
 
 
+def tangents(normals: FloatArray) -> FloatArray:
+    """Two orthonormal tangents at unit normals: (n, 3) -> (2, n, 3)."""
+    e = np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)])
+    e /= np.linalg.norm(e, axis=1, keepdims=True)
+    return np.stack([e, np.cross(normals, e)])
+
+
 class Shown:
     """A body with a table for notebooks; it has ``bounds``, and ``unit`` if that is known."""
 
@@ -103,7 +107,7 @@ class Shown:
         body: Any = self
         text, unit = " ".join(repr(body).split()), getattr(body, "unit", "L")
         rows = {
-            "body": text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}...",
+            "body": text if len(text) <= 120 else f"{text[:117]}...",
             "box": f"{' x '.join(f'{side:.4g}' for side in body.bounds[1] - body.bounds[0])} {unit}",
             "lengths": "metres" if unit == "m" else f"{unit}, any unit; wavenumbers are in its inverse",
         }
@@ -127,15 +131,11 @@ def teller(progress: Any) -> Callable[[str], None]:
         return _show
     if progress is not None and progress is not False and not callable(progress):
         raise TypeError(f"progress = {progress!r} cannot be called; give True or a function of one text")
-    return progress or _ignore
+    return progress or (lambda _: None)
 
 
 def _show(text: str) -> None:
     print(f"scatterers: {text}", file=sys.stderr)
-
-
-def _ignore(text: str) -> None:
-    pass
 
 
 @dataclass(frozen=True, eq=False)
@@ -328,6 +328,16 @@ def no_charts(sharp: Sequence[Crease]) -> NoCharts:
     """No charts because of edges and tips."""
     found = f"{len(sharp)} edges and tips, first {sharp[0]!r}" if sharp else "several pieces"
     return NoCharts(f"the body has {found}: no smooth charts cover it; take its tiles")
+
+
+def normals_of(pieces: Sequence[Levelled], points: FloatArray, which: IntArray) -> FloatArray:
+    """Unit normals (n, 3) of pieces with numbers (n,) at points (n, 3), L."""
+    found = np.zeros(points.shape)
+    for k in np.unique(which):
+        gradient = pieces[k].gradient(points[which == k])
+        with np.errstate(all="ignore"):
+            found[which == k] = gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)
+    return found
 
 
 class Piece(Levelled):

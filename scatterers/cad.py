@@ -21,11 +21,6 @@ from scatterers.triangles.quality import Choice, MeshQuality, assess
 from scatterers.triangles.regions import regions_of
 from scatterers.triangles.topology import edges_of
 
-CURVED = 30
-"""Triangles to a full turn of a curved face of a body with edges."""
-SPACING = 2.0
-"""Spacing of the grid in units of the mean distance of neighbouring points."""
-
 
 class Cad(FittedBody):
     """Smooth body of a STEP, IGES or BREP file, in metres.
@@ -132,8 +127,8 @@ class Cad(FittedBody):
         if quality.verdict != "smooth" and strict:
             raise ValueError(f"{path.name} is not smooth enough ({quality.verdict}): {quality.reasons}")
         if found.creases.any() or found.jumps.any() or (quality.verdict != "smooth" and found.level.any()):
-            # fillets ask for more points than faces
-            found = read_cad(path, reading, curved=CURVED, progress=progress)
+            # fillets ask for more points than faces: so many triangles to a full turn
+            found = read_cad(path, reading, curved=30, progress=progress)
             mesh, normals = found.mesh, found.corner_normals
             regions = regions_of(mesh.vertices, mesh.triangles, sharp=found.creases, level=found.level)
             return PieceCloud(
@@ -143,7 +138,7 @@ class Cad(FittedBody):
             found.mesh.vertices,
             np.where(np.isfinite(found.normals), found.normals, jets.normals),
             edge=quality.edge_mean,
-            spacing=SPACING * quality.edge_mean,
+            spacing=2.0 * quality.edge_mean,
             noise=0.0,
             non_smooth=found.mesh.vertices[quality.bad],
             distance=partial(signed_distance, found.mesh.vertices, jets),

@@ -24,24 +24,8 @@ from creeping._typing import FloatArray
 from scatterers.kernels.compiled import Compiled, Kind, helper
 
 FUNCTIONS = ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh")
-MAX_LENGTH = 2000
-MAX_POWER = 64
-MAX_DEPTH = 120
 LARGEST, HUGEST = 1e12, 1e300
 """Of numbers, and of what several multiplied become."""
-PLAIN = 2**20
-"""Whole numbers that stay such: those of their second derivatives still do for the compiler."""
-MOST_OPERATIONS = 20_000
-"""Of derivatives: about twenty seconds of differentiating and compiling."""
-LIBRARY = 100
-"""Operations that a call of a function is worth."""
-_BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.Pow: operator.pow,
-}
 
 
 class Choosing(NamedTuple):
@@ -195,8 +179,8 @@ def parse(text: str) -> Any:
         raise ValueError(f"expression {shown(text)} is not text; write one in x, y, z such as '1 + x'")
     if not text.strip():
         raise ValueError("the expression is empty; write one in x, y, z such as '1 + x'")
-    if len(text) > MAX_LENGTH:
-        raise ValueError(f"the expression has {len(text)} characters, more than {MAX_LENGTH}")
+    if len(text) > 2000:
+        raise ValueError(f"the expression has {len(text)} characters, more than 2000")
     try:
         tree = ast.parse(text.strip(), mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
@@ -220,8 +204,15 @@ def parse(text: str) -> Any:
             raise refuse(f"a number beyond {LARGEST:g}")
 
     def build(node: ast.expr, depth: int) -> Any:
-        if depth > MAX_DEPTH:
-            raise refuse(f"more than {MAX_DEPTH} nested operations")
+        binary = {
+            ast.Add: operator.add,
+            ast.Sub: operator.sub,
+            ast.Mult: operator.mul,
+            ast.Div: operator.truediv,
+            ast.Pow: operator.pow,
+        }
+        if depth > 120:
+            raise refuse("more than 120 nested operations")
         match node:
             case ast.Constant(value=bool()):
                 raise refuse(repr(node.value))
@@ -237,19 +228,19 @@ def parse(text: str) -> Any:
                 return build(operand, depth + 1)
             case ast.BinOp(op=ast.BitXor()):
                 raise ValueError(f"expression {shown(text)} contains ^, which is no power here; write x**2, not x^2")
-            case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in binary:
                 a, b = build(left, depth + 1), build(right, depth + 1)
                 if isinstance(op, ast.Pow):
                     require_moderate(a)
                     require_moderate(b)
-                    if not (b.is_number and abs(float(b)) <= MAX_POWER):
-                        raise refuse(f"a power that is not a number within +-{MAX_POWER}")
+                    if not (b.is_number and abs(float(b)) <= 64):
+                        raise refuse("a power that is not a number within +-64")
                     # before it is computed
                     most = LARGEST if a.is_number else HUGEST
                     factor = a if a.is_number else a.as_coeff_Mul()[0]
                     if abs(float(b)) * abs(math.log(abs(float(factor)) or 1.0)) > math.log(most):
                         raise refuse(f"a number beyond {most:g}")
-                result = _BINARY[type(op)](a, b)
+                result = binary[type(op)](a, b)
                 if result.has(sympy.zoo, sympy.nan, sympy.oo, -sympy.oo):
                     raise refuse("a division by zero")
                 if abs(result.as_coeff_Mul()[0]) > HUGEST:
@@ -353,12 +344,15 @@ def derivatives(expression: Any, text: str) -> Differentiated:
     import sympy
     from sympy.printing.pycode import PythonCodePrinter
 
-    if (size := _size(expression)) > MOST_OPERATIONS:
+    # about twenty seconds of differentiating and compiling
+    most = 20_000
+    if (size := _size(expression)) > most:
         raise ValueError(
-            f"the derivatives of expression {shown(text)} take about {size} operations, more than {MOST_OPERATIONS}; "
+            f"the derivatives of expression {shown(text)} take about {size} operations, more than {most}; "
             "write it with fewer factors in a product and fewer functions of functions"
         )
-    large = [one for one in expression.atoms(sympy.Rational) if max(abs(one.p), one.q) > PLAIN]
+    # whole numbers below stay such: those of their second derivatives still do for the compiler
+    large = [one for one in expression.atoms(sympy.Rational) if max(abs(one.p), one.q) > 2**20]
     expression = expression.xreplace({one: sympy.Float(one) for one in large})
     x, y, z = (sympy.Symbol(name, real=True) for name in "xyz")
     gradient = [expression.diff(v) for v in (x, y, z)]
@@ -418,4 +412,5 @@ def _operations(lines: list[str]) -> float:
     """Floating-point operations of printed code, about; see `scatterers.kernels.compiled.Compiled`."""
     text = "\n".join(lines)
     called = len(re.findall(rf"\b(?:{'|'.join(FUNCTIONS)})\(", text))
-    return float(LIBRARY * called + len(re.findall(r" [+/-] |\*", text)))
+    # operations that a call of a function is worth
+    return float(100 * called + len(re.findall(r" [+/-] |\*", text)))

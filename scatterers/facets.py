@@ -18,13 +18,6 @@ from scatterers.triangles.cad_file import POINTS, SUFFIXES, CadReading, cad_tria
 from scatterers.triangles.files import read_mesh
 from scatterers.triangles.quality import Choice
 
-SOMEWHERE = np.array([0.3602, 0.5413, 0.7597])
-"""Direction of the rays that tell inside from outside: along no axis or plane of symmetry."""
-CELLS = 512
-"""Cells along a side of the plane across rays, at most."""
-MOST = 10_000_000
-"""Pairs of a triangle and a cell, at most."""
-
 
 class Facets(Shown):
     """Body bounded by the flat triangles of a closed mesh, in metres.
@@ -110,7 +103,9 @@ class Facets(Shown):
 
     def inside(self, points: FloatArray) -> BoolArray:
         """Whether points (m, 3), L, are inside the body: (m,)."""
-        along = SOMEWHERE / np.linalg.norm(SOMEWHERE)
+        # along no axis or plane of symmetry
+        along = np.array([0.3602, 0.5413, 0.7597])
+        along /= np.linalg.norm(along)
         return np.asarray(self._crossed(points, along, 0.0, len(self.triangles)) % 2 == 1)
 
     def hidden(self, points: FloatArray, direction: FloatArray) -> BoolArray:
@@ -134,14 +129,15 @@ class Facets(Shown):
 
 def _in_cells(corners: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
     """Triangles (t, 3, 2) of the plane by the cells that their boxes meet: starts, members, and the cells' sides."""
-    cells = int(np.clip(np.sqrt(len(corners)), 1, CELLS))
+    # along a side of the plane
+    cells = int(np.clip(np.sqrt(len(corners)), 1, 512))
     low, high = corners.min(axis=1), corners.max(axis=1)
     while True:
         step = np.maximum(high.max(axis=0), 1e-300) * (1 + 1e-9) / cells
         first, last = ((end / step).astype(np.int64) for end in (low, high))
         wide = last - first + 1
         each = wide.prod(axis=1)
-        if each.sum() < MOST or cells == 1:
+        if each.sum() < 10_000_000 or cells == 1:
             break
         # long triangles across everything
         cells = max(1, cells // 2)

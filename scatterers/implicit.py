@@ -41,10 +41,6 @@ from scatterers.exact.switches import ExpressionSpace, Switches
 from scatterers.expression import one_sided
 from scatterers.fits.tensor import TensorSpline, coefficients
 
-MOST_TIPS = 8
-PER_EDGE = 1.5
-"""Cells of the grid to an edge of tiles: sides are 1.15 edges at most."""
-
 
 class Implicit(LevelBody):
     """Body F < 0 given by an expression in x, y, z, such as ``"x**2/1.44 + y**2 + z**2 - 1"``.
@@ -118,12 +114,13 @@ class Implicit(LevelBody):
             self.__class__ = PiecewiseImplicit
 
     def _tips(self, samples: Samples, strict: bool) -> FloatArray:
-        points, spacing, size = samples.crossings(), float(samples.spacing.max()), self._diagonal
+        points, spacing = samples.crossings(), float(samples.spacing.max())
+        size = float(np.linalg.norm(self._bounds[1] - self._bounds[0]))
         flat = singular_points(self.compiled, points, size)
-        if len(flat) > MOST_TIPS:
+        if len(flat) > 8:
             raise ValueError(
                 f"F = 0 is not smooth: grad F = 0 at {len(flat)} of its points, first {tuple(flat[0].tolist())}, more "
-                f"than the {MOST_TIPS} tips of a body; an edge, or F that does not change sign linearly: write it "
+                "than the 8 tips of a body; an edge, or F that does not change sign linearly: write it "
                 "otherwise"
             )
         if crossed := [place for place in flat if not is_tip(self.compiled, place, size)]:
@@ -133,9 +130,9 @@ class Implicit(LevelBody):
             )
         sharp, bends = kinks(self.compiled, points, spacing, size)
         apart = distinct(sharp, bends, size)
-        if len(apart) <= MOST_TIPS:
+        if len(apart) <= 8:
             apart = np.array([polished(self.compiled, place, size) for place in apart]).reshape(-1, 3)
-        tips = len(apart) <= MOST_TIPS and all(is_tip(self.compiled, place, size) for place in apart)
+        tips = len(apart) <= 8 and all(is_tip(self.compiled, place, size) for place in apart)
         if not tips:
             refuse_kinks(sharp, bends)
         found = distinct(np.concatenate([flat, apart]), np.arange(len(flat) + len(apart), 0.0, -1.0), size)
@@ -187,10 +184,6 @@ class Implicit(LevelBody):
             raise ValueError(failure)
         self._place(space, samples, sphere_map)
 
-    @property
-    def _diagonal(self) -> float:
-        return float(np.linalg.norm(self._bounds[1] - self._bounds[0]))
-
     def __repr__(self) -> str:
         return f"Implicit({self.expression!r}, speed={self.speed!r})"
 
@@ -241,7 +234,8 @@ class PiecewiseImplicit(Implicit):
             If ``edge`` is not a positive finite number, or so small that the grid is too large.
         """
         positive(edge=edge)
-        points, triangles = march(self.level, self._bounds, edge / PER_EDGE)
+        # 1.5 cells of the grid to an edge: sides are 1.15 edges at most
+        points, triangles = march(self.level, self._bounds, edge / 1.5)
         clipped = clip(self, self._pieces, self._numbers, points, triangles)
         corners, directions = clipped.corners, normals(self._pieces, clipped.corners, clipped.pieces)
         outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -255,8 +249,6 @@ class PiecewiseImplicit(Implicit):
         return no_charts(sharp) if sharp else super().atlas
 
 
-MOST = 1000
-"""Nodes along an axis of a body that is sampled."""
 FEWEST = 8
 
 
@@ -347,9 +339,10 @@ class Gridded(LevelBody):
         >>> float(abs(body.level([0.0, 0.8, 0.0])).round(9))
         0.0
         """
+        most = 1000
         counts = np.broadcast_to(nodes, 3).tolist()
-        if not all(FEWEST <= n <= MOST for n in counts):
-            raise ValueError(f"nodes = {nodes!r}; give one or three whole numbers from {FEWEST} to {MOST}")
+        if not all(FEWEST <= n <= most for n in counts):
+            raise ValueError(f"nodes = {nodes!r}; give one or three whole numbers from {FEWEST} to {most}")
         positive(margin=margin)
         box = numbers_of("bounds", body.bounds, (2, 3))
         widened = margin * 0.5 * (box[1] - box[0])
@@ -379,11 +372,10 @@ def _checked(samples: ArrayLike) -> FloatArray:
         raise ValueError(f"{bad} of {nodes.size} samples are not finite; give F at every node, also far away")
     if not np.any(nodes < 0):
         raise ValueError(f"none of {nodes.size} samples is negative: no body; give F < 0 inside, or more nodes")
-    edge = np.ones(nodes.shape, dtype=bool)
-    edge[1:-1, 1:-1, 1:-1] = False
-    if bad := int(np.sum(~(nodes[edge] > 0))):
+    faces = Samples(nodes, np.zeros(3), np.ones(3)).on_faces()
+    if bad := int(np.sum(~(faces > 0))):
         raise ValueError(
-            f"F <= 0 at {bad} of {edge.sum()} nodes on the grid's faces: the body leaves the grid or F is negative "
+            f"F <= 0 at {bad} of {len(faces)} nodes on the grid's faces: the body leaves the grid or F is negative "
             "outside; widen the box or change the sign"
         )
     return nodes

@@ -26,28 +26,12 @@ from scatterers.triangles.files import TriangleMesh, mesh_bytes, read_mesh
 from scatterers.triangles.jets import Jets, angle_weighted_normals, centroids, osculating_jets, signed_distance
 from scatterers.triangles.quality import Choice, MeshQuality, assess, jumps_at, noise_at_most
 from scatterers.triangles.regions import FEWEST, regions_of
-from scatterers.triangles.subdivision import MOST_SUBDIVIDED, Subdivision, edges_where_curved, subdivided
+from scatterers.triangles.subdivision import Subdivision, edges_where_curved, subdivided
 
-CLEAN, NOISY = 1.3, 4.0
-"""Spacings of the grid in units of the mean edge: for vertices and the points between them, and for noisy vertices,"""
-TURN = 0.5
-"""but these no more than so much over the curvature."""
-GRID, ENOUGH, SMALL = 1e6, 2.0, 0.2
-"""Nodes of the largest grid wanted; the spacing, in edges, at which vertices alone do, and over the radius of curvature
-at which nothing is lost."""
+GRID = 1e6
+"""Nodes of the largest grid wanted."""
 NOISE = 2e-4
 """Noise in units of the mean edge from which on vertices count as noisy: below, the fit's own error is larger."""
-MOST_NOISE = 5e-3
-"""Noise in units of the mean edge up to which jets find joints."""
-OF_SOURCE, NARROWEST, SMOOTHED = (1.3, 1.0, 0.65), 0.45, 1e-3
-"""Spacings for a subdivided mesh, in edges of its source where it curves, these no less than so much of the mean edge;
-and smoothing: finer grids and less of it leave ripples."""
-MOST_SUBDIVISIONS, FEWEST_SUBDIVIDED = 3, 300
-"""With "auto" a coarse mesh is subdivided once: its vertices hold no more; again while it has fewer than so many."""
-FEW_BAD = 0.05
-"""Share of bad vertices up to which they are left out; beyond, the fit is judged as a whole,"""
-UNCERTAIN, UNCERTAIN_SUBDIVIDED = 0.25, 0.5
-"""by how far its curvatures depend on the grid, relative to their rms; of a subdivided mesh more is counted."""
 
 
 class Mesh(FittedBody):
@@ -146,8 +130,8 @@ class Mesh(FittedBody):
             return pieces
         if mesh.loop is not None:
             return _subdivided_cloud(mesh, mesh.loop, jets, quality, source_name(source))
-        # nearly all of it bad: a whole fit tells what it is worth
-        coarse = quality.verdict == "too coarse" and quality.bad_share > FEW_BAD
+        # more bad vertices than can be left out: a whole fit tells what it is worth
+        coarse = quality.verdict == "too coarse" and quality.bad_share > 0.05
         bad = quality.bad & (quality.verdict != "noisy") & (not coarse)
         if bad.any():
             # jets say nothing there, the triangles a little
@@ -160,12 +144,13 @@ class Mesh(FittedBody):
         mean = np.where(jets.fitted, jets.mean, np.nan)
         noisy, wide = quality.noise >= NOISE, spacing_of(points, GRID)
         if noisy:
-            spacing = float(np.clip(TURN / max(quality.curvature, 1e-9), CLEAN, NOISY)) * edge
-        elif wide > ENOUGH * edge and quality.curvature * wide < SMALL * edge:
-            # very fine meshes tell more than the fit can use
+            # up to 4 edges, but no more than half the radius of curvature
+            spacing = float(np.clip(0.5 / max(quality.curvature, 1e-9), 1.3, 4.0)) * edge
+        elif wide > 2.0 * edge and quality.curvature * wide < 0.2 * edge:
+            # very fine meshes tell more than the fit can use, and vertices alone do
             spacing = wide
         else:
-            spacing = CLEAN * edge
+            spacing = 1.3 * edge
             more = centroids(mesh.vertices, mesh.triangles, jets)
             points, normals = np.concatenate([points, more[0]]), np.concatenate([normals, more[1]])
             mean = np.concatenate([mean, np.full(len(more[0]), np.nan)])
@@ -179,22 +164,25 @@ class Mesh(FittedBody):
             distance=partial(signed_distance, mesh.vertices, jets),
             mean_curvature=None if noisy else mean,
             quality=quality,
-            uncertain=UNCERTAIN if coarse else np.inf,
+            # by which curvatures may depend on the grid, relative to their rms
+            uncertain=0.25 if coarse else np.inf,
             notes={"repairs": list(mesh.repairs), "source": source_name(source)},
         )
 
 
 def _subdivided_cloud(mesh: TriangleMesh, loop: Subdivision, jets: Jets, quality: MeshQuality, name: str) -> PointCloud:
     """Points of a subdivided mesh, for grids and a smoothing that leave out what its source does not hold."""
+    # spacings in edges of the source where it curves; finer grids and less smoothing leave ripples
+    of_source = (1.3, 1.0, 0.65)
     curvature = np.abs(jets.principal).max(axis=1)
-    edge = max(edges_where_curved(mesh.vertices, mesh.triangles, curvature), NARROWEST * quality.edge_mean)
-    grids = tuple(cells * edge * 2**loop.times for cells in OF_SOURCE)
+    edge = max(edges_where_curved(mesh.vertices, mesh.triangles, curvature), 0.45 * quality.edge_mean)
+    grids = tuple(cells * edge * 2**loop.times for cells in of_source)
     others = osculating_jets(loop.nearer, mesh.triangles)
     return PointCloud(
         mesh.vertices,
         jets.normals,
         # what is said of a vertex of the source is of an edge about it
-        edge=grids[0] / OF_SOURCE[0] / DISTRUSTED,
+        edge=grids[0] / of_source[0] / DISTRUSTED,
         spacing=grids[0],
         noise=0.0,
         non_smooth=np.zeros((0, 3)),
@@ -202,8 +190,9 @@ def _subdivided_cloud(mesh: TriangleMesh, loop: Subdivision, jets: Jets, quality
         mean_curvature=None,
         quality=quality,
         notes={"repairs": list(mesh.repairs), "source": name},
-        uncertain=UNCERTAIN_SUBDIVIDED,
-        smoothing=SMOOTHED,
+        # more than of other meshes, as more is counted
+        uncertain=0.5,
+        smoothing=1e-3,
         narrower=grids[1:],
         nearer=Nearer(loop.nearer, others.normals, partial(signed_distance, loop.nearer, others), loop.source),
     )
@@ -280,8 +269,9 @@ def _examined(source: Any, units: str | None, choice: Choice, progress: Callable
             "out: its smooth pieces are taken as they are; or give more vertices where it is to be smooth"
         )
     found = mesh
-    for count in range(1, MOST_SUBDIVISIONS + 1) if times == "auto" else (int(times),):
-        if times == "auto" and 4 * len(found.vertices) > MOST_SUBDIVIDED:
+    # a coarse mesh once, as its vertices hold no more; again while they are few
+    for count in range(1, 4) if times == "auto" else (int(times),):
+        if times == "auto" and 4 * len(found.vertices) > 60_000:
             break
         notes: list[str] = []
         loop = subdivided(mesh.vertices, mesh.triangles, count, notes.append)
@@ -289,7 +279,7 @@ def _examined(source: Any, units: str | None, choice: Choice, progress: Callable
         progress(f"normals of {len(found.vertices)} vertices")
         jets = osculating_jets(found.vertices, found.triangles)
         quality = assess(found.vertices, found.triangles, jets)
-        if quality.verdict != "too coarse" or len(found.vertices) >= FEWEST_SUBDIVIDED:
+        if quality.verdict != "too coarse" or len(found.vertices) >= 300:
             break
     for line in found.repairs[len(mesh.repairs) :]:
         progress(line)
@@ -320,7 +310,8 @@ def _with_joints(quality: MeshQuality, mesh: TriangleMesh, jets: Jets) -> tuple[
     clean = jets.fitted & ~quality.bad & ~jumps_at(jets, quality.edge_mean)
     joints = jointed(mesh.vertices, mesh.triangles, jets.normals, clean) if told else None
     noise = noise_at_most(jets)
-    if joints is None and noise < MOST_NOISE * quality.edge_mean:
+    # with more noise jets find no joints
+    if joints is None and noise < 5e-3 * quality.edge_mean:
         joints = jointed(mesh.vertices, mesh.triangles, jets.normals, clean, noise)
     if joints is None or joints.sharp.any():
         return quality, joints

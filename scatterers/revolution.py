@@ -18,13 +18,6 @@ from scatterers.body import numbers
 from scatterers.exact.profile import Line, Segment, SplineSegment, smooth_end, upward
 from scatterers.exact.revolved import Revolved
 
-RIGHT_ANGLE = 0.05
-"""Radians from a right angle to the axis within which a splined end on it is a smooth pole."""
-MOST_POINTS = 200_000
-"""Of a table: half a gigabyte of splines, in ten seconds."""
-ROUNDING = 1e-14
-"""Numbers of a table this small, relative to the largest, are 0."""
-
 
 class Revolution(Revolved):
     """Closed body of revolution about the z axis.
@@ -100,12 +93,13 @@ def _segments(profile: Any, corners: Iterable[int]) -> list[Segment]:
         ) from None
     if table.ndim != 2 or table.shape[1] != 2 or len(table) < 2:
         raise ValueError(f"profile of shape {table.shape}; give points (n, 2), (z, radius), two at least")
-    if len(table) > MOST_POINTS:
-        raise ValueError(f"{len(table)} points of the profile are more than {MOST_POINTS}; splines need fewer")
+    # splines of so many take half a gigabyte and ten seconds
+    if len(table) > 200_000:
+        raise ValueError(f"{len(table)} points of the profile are more than 200000; splines need fewer")
     if bad := int(np.sum(~np.all(np.isfinite(table), axis=1))):
         raise ValueError(f"{bad} of {len(table)} points of the profile are not finite")
     # cos(pi/2) is not quite 0
-    table = np.where(np.abs(table) < ROUNDING * np.max(np.abs(table)), 0.0, table)
+    table = np.where(np.abs(table) < 1e-14 * np.max(np.abs(table)), 0.0, table)
     if bad := int(np.sum(table[:, 1] < 0)):
         raise ValueError(f"the radius of {bad} of {len(table)} points of the profile is negative")
     if wrong := [k for k in given if not -len(table) <= k < len(table)]:
@@ -131,9 +125,11 @@ def _segments(profile: Any, corners: Iterable[int]) -> list[Segment]:
 
 def _between(points: FloatArray, may_be_poles: tuple[bool, bool]) -> Segment:
     """Line or spline from corner to corner."""
+    # within so many radians of a right angle to the axis an end is a smooth pole
+    limit = 0.05
     if len(points) == 2:
         (z0, r0), (z1, r1) = points.tolist()
         return Line((z0, r0), (z1, r1))
-    first = may_be_poles[0] and points[0, 1] == 0 and smooth_end(points, True, RIGHT_ANGLE)
-    last = may_be_poles[1] and points[-1, 1] == 0 and smooth_end(points, False, RIGHT_ANGLE)
+    first = may_be_poles[0] and points[0, 1] == 0 and smooth_end(points, True, limit)
+    last = may_be_poles[1] and points[-1, 1] == 0 and smooth_end(points, False, limit)
     return SplineSegment(points, (first, last))

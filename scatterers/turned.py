@@ -235,11 +235,6 @@ class Capsule(Lengthy):
         ]
 
 
-WIDE, BACK = 29 / 150, 5 / 12
-FLAT = 3.0
-"""Width over thickness."""
-
-
 Pair = tuple[float, float]
 
 
@@ -392,9 +387,9 @@ class Almond(Revolved):
     length: float = 9.936 * 0.0254
     speed: Any = None
 
-    # u, v, w are y, 3 z and x
+    # u, v, w are y, 3 z and x: it is three times as wide as thick
     _axes = (1, 2, 0)
-    _stretch = FLAT
+    _stretch = 3.0
 
     def __post_init__(self) -> None:
         positive(length=self.length)
@@ -402,7 +397,7 @@ class Almond(Revolved):
 
     @cached_property
     def _profile(self) -> Sequence[Segment]:
-        a, b = WIDE * self.length, BACK * self.length
+        a, b = 29 / 150 * self.length, 5 / 12 * self.length
         tip = math.fsum([self.length, -b])
         widest = 0.0, a
         return [

@@ -29,9 +29,6 @@ from creeping.shadow.attachment import SAMPLES, LaunchPoints, occluded
 from creeping.shadow.curves import NEAR, Curves, moved_onto_lines
 from creeping.shadow.status import ATTACHED, CONCAVE, OCCLUDED, STATUSES
 
-MOST = 64
-"""Most crossings of a line. With more, two curves coincide in the picture, and crossings mean nothing."""
-
 
 class Breaks(NamedTuple):
     """Breaks of lines.
@@ -162,13 +159,15 @@ def _axis_of(x: FloatArray, wave: FloatArray, box: FloatArray) -> tuple[FloatArr
 
 
 def _crossings(curves: Curves, picture: Picture) -> tuple[IntArray, FloatArray, BoolArray]:
-    """Crossings of the pictures of lines: curves (k,) and places (k,) of the parts behind, and lines (n,) with MOST."""
+    """Crossings of the pictures of lines: curves (k,), places (k,) of the parts behind, lines (n,) with too many."""
     from creeping.shadow.kernels.crossings import crossings
 
-    pairs, count = np.empty((len(curves.waves), MOST, 2), np.int64), np.empty(len(curves.waves), np.int64)
+    # with more crossings two curves coincide in the picture, and crossings mean nothing
+    most = 64
+    pairs, count = np.empty((len(curves.waves), most, 2), np.int64), np.empty(len(curves.waves), np.int64)
     crossings(picture.seen, curves.first, curves.number, curves.line, pairs, count)
-    i, m = pairs[(np.arange(MOST) < count[:, None]) & (count[:, None] <= MOST)].T
-    upon = count > MOST
+    i, m = pairs[(np.arange(most) < count[:, None]) & (count[:, None] <= most)].T
+    upon = count > most
     if not len(i):
         return i, np.zeros(0), upon
     own, other = curves.own[i], curves.own[m]
@@ -223,13 +222,6 @@ def _solved(curves: Curves, picture: Picture, i: IntArray, m: IntArray) -> tuple
         best = newton(best, *polynomials(best))
     one, two = np.where(near, best, start)
     return one, two
-
-
-PROBES = (0.5, 0.2, 0.8)
-"""Parts of an arc at which its state is asked for; the first one decides."""
-BESIDE = 2
-"""Nodes from a break within which an outermost node does not say that its arc is lit: of two curves that nearly touch
-in the picture the hidden one may have it (directions within 0.4 degrees of the axis of two congruent lobes)."""
 
 
 class Arcs(NamedTuple):
@@ -301,27 +293,30 @@ def _states(
     body: Surface, curves: Curves, curve: IntArray, ends: FloatArray, extreme: IntArray
 ) -> tuple[IntArray, BoolArray]:
     """States (a,) of arcs, and whether all their probes agree."""
+    # parts of an arc at which its state is asked for; the first one decides
+    tried = (0.5, 0.2, 0.8)
     long = ends[:, 1] - ends[:, 0]
-    places = ends[:, :1] + np.array(PROBES) * long[:, None]
-    probed, waves = np.repeat(curve, len(PROBES)), curves.waves[curves.line[curve]]
+    places = ends[:, :1] + np.array(tried) * long[:, None]
+    probed, waves = np.repeat(curve, len(tried)), curves.waves[curves.line[curve]]
     x = curves.values_at(curves.points, probed, places.ravel())
-    there = moved_onto_lines(body, np.repeat(waves, len(PROBES), axis=0), x, reach=NEAR * size(body), steps=1)
-    concave = ~(there.curvature[:: len(PROBES)] > 0)
-    # next to a break an outermost node may lie on either side of it
+    there = moved_onto_lines(body, np.repeat(waves, len(tried), axis=0), x, reach=NEAR * size(body), steps=1)
+    concave = ~(there.curvature[:: len(tried)] > 0)
+    # next to a break, within two nodes, an outermost node does not say that its arc is lit: of two curves that nearly
+    # touch in the picture the hidden one may have it (directions within 0.4 degrees of the axis of two congruent lobes)
     outermost = extreme[curves.line[curve]]
     own = (outermost >= 0) & (curves.own[outermost] == curve[:, None])
     away = (outermost - curves.first[curve][:, None] - ends[:, :1]) % curves.number[curve][:, None]
-    inside = own & (away > BESIDE) & (away < long[:, None] - BESIDE)
+    inside = own & (away > 2) & (away < long[:, None] - 2)
     asked = np.flatnonzero(~concave & ~np.any(inside, axis=1))
     state, agree = np.where(concave, CONCAVE, ATTACHED), np.ones(len(curve), dtype=bool)
     if len(asked):
-        probes = there.points.reshape(-1, len(PROBES), 3)[asked]
+        probes = there.points.reshape(-1, len(tried), 3)[asked]
         q = waves[asked, None, :3] + waves[asked, None, 3:] * probes
         w = waves[asked, None, 3]
         # of a point source the last sample stands at it
         before = np.where(w > 0, np.linalg.norm(q, axis=-1) / np.where(w > 0, w, 1) * SAMPLES / (SAMPLES + 1), np.inf)
         toward = np.broadcast_to(headings(waves[asked, None], probes), probes.shape)
-        hidden = occluded(body, probes.reshape(-1, 3), toward.reshape(-1, 3), before.ravel()).reshape(-1, len(PROBES))
+        hidden = occluded(body, probes.reshape(-1, 3), toward.reshape(-1, 3), before.ravel()).reshape(-1, len(tried))
         state[asked] = np.where(hidden[:, 0], OCCLUDED, ATTACHED)
         agree[asked] = np.all(hidden == hidden[:, :1], axis=1)
     return state, agree

@@ -27,10 +27,6 @@ from creeping.shadow.status import NO_RAY
 
 SAMPLES = 192
 """Samples of F from a point to where its backward ray leaves the box."""
-SLICE = 256
-"""Rays at a time."""
-ABOVE = 1e-5
-"""Height of points just above nodes of tiles, in body sizes: the polynomials of tiles may pass under the body."""
 
 
 class Arc(NamedTuple):
@@ -140,6 +136,8 @@ def occluded(body: Surface, points: FloatArray, direction: FloatArray, reach: Fl
 
     Points lie on the body, where it is lit or touched from outside, or above it.
     """
+    # so many rays at a time
+    together = 256
     hidden = np.zeros(len(points), dtype=bool)
     d, limit = np.broadcast_to(direction, points.shape), np.broadcast_to(reach, len(points))
     low, high = np.asarray(body.bounds, dtype=float)
@@ -149,8 +147,8 @@ def occluded(body: Surface, points: FloatArray, direction: FloatArray, reach: Fl
     step = np.minimum(np.maximum(out, 0.5e-3 * np.linalg.norm(high - low)), limit) / SAMPLES
 
     def run(slice_: slice) -> None:
-        for start in range(slice_.start, slice_.stop, SLICE):
-            some(slice(start, min(start + SLICE, slice_.stop)))
+        for start in range(slice_.start, slice_.stop, together):
+            some(slice(start, min(start + together, slice_.stop)))
 
     def some(part: slice) -> None:
         x, back, h = points[part], d[part], step[part, None]
@@ -163,7 +161,7 @@ def occluded(body: Surface, points: FloatArray, direction: FloatArray, reach: Fl
             under = _dips(body, x[row], back[row], t[row, sample + 1], h[row, 0])
             hidden[part.start + row[under]] = True
 
-    in_slices(run, len(points), multiple=SLICE)
+    in_slices(run, len(points), multiple=together)
     return hidden
 
 
@@ -184,7 +182,8 @@ def is_lit(body: Any, points: FloatArray, normals: FloatArray, direction: FloatA
     """Whether the wave comes straight to points of the body with normals (m, 3): (m,)."""
     lit = np.asarray(normals @ direction < 0)
     if not (is_piecewise(body) and is_convex(body)):
-        above = points[lit] + ABOVE * size(body) * normals[lit]
+        # just above nodes of tiles, in body sizes: the polynomials of tiles may pass under the body
+        above = points[lit] + 1e-5 * size(body) * normals[lit]
         lit[lit] = ~_hidden(body, above, direction)
     return lit
 

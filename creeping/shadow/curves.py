@@ -2,7 +2,7 @@
 
 Also here: points next to shadow lines moved onto them, each onto the line of its own wave.
 
-A place is a number of nodes with a fraction, u; between nodes a quantity is the polynomial of degree 2 HALF - 1 through
+A place is a number of nodes with a fraction, u; between nodes a quantity is the polynomial of degree 11 through
 the nodes around. What is done here for one curve does not depend on the others.
 
 Sources: Derivations, R6 and R8.
@@ -23,9 +23,8 @@ from creeping.kernels.threads import in_threads
 
 NEAR = 1e-2
 """Longest step, in body sizes, that brings an interpolated point onto the line; nodes are much closer."""
-HALF = 6
-"""Nodes on either side that a polynomial along a curve goes through."""
-_OFFSETS = np.arange(1 - HALF, HALF + 1)
+_OFFSETS = np.arange(-5, 7)
+"""Nodes around a place that a polynomial along a curve goes through."""
 _SCALES = np.array([np.prod([j - i for i in _OFFSETS if i != j], dtype=float) for j in _OFFSETS])
 
 
@@ -146,7 +145,7 @@ def interpolated(rows: FloatArray, first: IntArray | int, number: IntArray | int
     around = np.asarray(first)[..., None] + (whole[:, None] + _OFFSETS) % np.asarray(number)[..., None]
     # one after the other: sums of a library's own order differ with the number of rows
     total = weights[:, :1] * rows[around[:, 0]]
-    for j in range(1, 2 * HALF):
+    for j in range(1, len(_OFFSETS)):
         total += weights[:, j : j + 1] * rows[around[:, j]]
     return np.asarray(total)
 

@@ -40,9 +40,6 @@ from creeping.shadow.refinement import FORBIDDEN, followed
 from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, OK, SINGULAR, STATUSES
 from creeping.storage.memory import within_budget
 
-NEAREST, FARTHEST = 1e-5, 1e6
-"""Heights of a point source above the body, in body sizes."""
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShadowLine(DrawnOnBody):
@@ -243,15 +240,17 @@ def wave_words(source: Incident) -> str:
 
 def _checked_height(body: Surface, source: PointSource) -> None:
     """Refuse a point source inside the body, on it, or so near or far that no line can be told."""
+    # heights in body sizes
+    nearest, farthest = 1e-5, 1e6
     height, unit = clearance(body, np.array(source.position)), size(body)
-    if height > FARTHEST * unit:
+    if height > farthest * unit:
         raise InvalidInputError(
-            f"{source!r} is {height / unit:.1e} body sizes away, more than {FARTHEST:g}: give a PlaneWave"
+            f"{source!r} is {height / unit:.1e} body sizes away, more than {farthest:g}: give a PlaneWave"
         )
-    if height <= NEAREST * unit:
+    if height <= nearest * unit:
         where = "inside the body or on it" if height <= 0 else f"{height / unit:.1e} body sizes above it"
         raise InvalidInputError(
-            f"{source!r} is {where}, where it launches no creeping rays; put it {NEAREST:g} sizes above. "
+            f"{source!r} is {where}, where it launches no creeping rays; put it {nearest:g} sizes above. "
             "creeping.source_pattern gives the far field of sources on the body, creeping.coupling fields between them"
         )
 
@@ -307,8 +306,6 @@ def shares_of(line: ShadowLine) -> dict[str, float]:
     return dict(zip(line.fractions, shares.tolist(), strict=True))
 
 
-LEAST = 8
-"""Fewest incidences worth a thread."""
 TOGETHER = 64
 """Most incidences at a time."""
 
@@ -413,7 +410,8 @@ def _on_meshes(
                 mine = rows[part][there]
                 certain[mine] = sure[there] & take(mine, [one for one in nodes if one is not None])
 
-        in_threads(run, len(rows), least=LEAST, multiple=1, most=TOGETHER)
+        # fewer incidences are not worth a thread
+        in_threads(run, len(rows), least=8, multiple=1, most=TOGETHER)
         onward, status[rows] = judged(v[rows], certain[rows], meshes.turn(tier), tier)
         rows = rows[onward]
     return status, v

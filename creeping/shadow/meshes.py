@@ -29,8 +29,6 @@ from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, OK
 
 TIERS = ((2_500, 512), (10_000, 2048), (40_000, 4096))
 """Vertices of the meshes, and nodes of a line on them."""
-FINEST_NODES = 8192
-"""Nodes of a line on the last mesh, the one before with every edge halved; it is made when a line asks for it."""
 
 
 class LineMeshes:
@@ -71,7 +69,8 @@ class LineMeshes:
         """Mesh of a tier as `shadow.kernels.trace.lines_on_mesh` takes it."""
         with self._lock:
             if tier not in self._packed:
-                nodes = FINEST_NODES if tier == len(TIERS) else TIERS[tier][1]
+                # the last mesh is the one before with every edge halved
+                nodes = 8192 if tier == len(TIERS) else TIERS[tier][1]
                 self._packed[tier] = _packed(self._body(), self.mesh(tier), nodes)  # type: ignore[arg-type]
             return self._packed[tier]
 

@@ -29,8 +29,6 @@ ORDER = 16
 """Gauss points of a panel."""
 LENGTH_TOLERANCE = 1e-12
 """Last coefficients of a panel's arclength, relative to the curve."""
-MIN_ALIGNMENT = 0.6
-"""Smallest T.c/|c| on a panel: tangents within 53 degrees of the chord."""
 _U, _WEIGHTS = legendre.leggauss(ORDER)
 # values at the Gauss points -> Legendre coefficients, exact for polynomials below the order
 _TO_COEFFICIENTS = (legendre.legvander(_U, ORDER - 1) * _WEIGHTS[:, None] * (np.arange(ORDER) + 0.5)).T
@@ -233,13 +231,15 @@ def _fit(
     tolerance: float,
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Coefficients of x and ds/du of panels from a to b, and whether they are exact."""
+    # smallest T.c/|c| on a panel: tangents within 53 degrees of the chord
+    least = 0.6
     chord = b - a
     long = np.linalg.norm(chord, axis=1)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         axis = np.repeat(chord / long[:, None], ORDER, axis=0)
         points = _hermite(a, Ta, b, Tb, _U).reshape(-1, 3)
     reach = np.repeat(0.2 * long, ORDER)
-    good_ends = np.minimum(np.sum(Ta * chord, axis=1), np.sum(Tb * chord, axis=1)) > MIN_ALIGNMENT * long
+    good_ends = np.minimum(np.sum(Ta * chord, axis=1), np.sum(Tb * chord, axis=1)) > least * long
     step = np.zeros_like(points)
     for _ in range(7):
         step, _ = newton_step(body, wave, points, axis)
@@ -256,7 +256,7 @@ def _fit(
             np.linalg.norm(shape.sum(axis=1) - b, axis=1),
             np.linalg.norm((shape * (-1.0) ** np.arange(ORDER)[:, None]).sum(axis=1) - a, axis=1),
         )
-        good = good_ends & np.all(aligned > MIN_ALIGNMENT, axis=1) & np.all(moved < 1e-8 * long[:, None], axis=1)
+        good = good_ends & np.all(aligned > least, axis=1) & np.all(moved < 1e-8 * long[:, None], axis=1)
         good &= (tail < tolerance) & (miss < 1e-7 * long)
     return shape, speed, np.asarray(good)
 

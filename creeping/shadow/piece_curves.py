@@ -20,20 +20,12 @@ from creeping.geometry.piecewise import Tiles, nearest_crease, piece_ahead, tips
 from creeping.geometry.surface import size
 from creeping.shadow.curves import Moved, moved_onto_lines, tangents_at
 
-STEP, LEAST_STEP = 0.04, 1e-6
-"""Longest and shortest step along a curve, in body sizes."""
-TURN = 0.25
-"""Largest angle between tangents a step apart, radians."""
 ASTRAY = 1.5
 """Distance from the tiles of a piece, in their longest side, beyond which F = 0 is another sheet, as fits may have."""
 ALIKE = 0.1
 """Distance from a curve, in its steps, up to which a seed lies on it: chords leave it by a third of that."""
 EDGE_ON = 1e-7
 """|n.d| on a whole piece up to which it lies edge-on and has no line of its own."""
-MOST = 20_000
-"""Nodes of a curve at most."""
-CLOSE = 1e-11
-"""Residual, in body sizes, of a point of the line."""
 
 
 class PieceCurve(NamedTuple):
@@ -139,7 +131,7 @@ class _Walk:
         return kept
 
     def _solved(self, found: Moved) -> BoolArray:
-        return found.left < CLOSE * self.size
+        return found.left < 1e-11 * self.size
 
     def inside(self, x: FloatArray) -> BoolArray:
         """Whether points of the line are of this piece (n,), and not of a sheet of its F far from the body."""
@@ -177,19 +169,22 @@ class _Walk:
 
     def _followed(self, start: FloatArray, T0: FloatArray, sign: float) -> tuple[FloatArray, bool, int, float]:
         """Nodes from the start along sign T, whether they come round, the crease they end at, and the gap to it."""
-        nodes, T, h = [start], T0, STEP * self.size
-        while len(nodes) < MOST:
+        # step in body sizes, and nodes
+        longest, most = 0.04, 20_000
+        nodes, T, h = [start], T0, longest * self.size
+        while len(nodes) < most:
             x = nodes[-1]
             tip = float(self._to_tip(x[None])[0])
             if tip <= REACH * self.size:
                 return np.array(nodes), False, *self._end(x, tip)
-            h = min(h, STEP * self.size, max(0.5 * tip, 0.5 * REACH * self.size))
+            h = min(h, longest * self.size, max(0.5 * tip, 0.5 * REACH * self.size))
             found = self._corrected((x + sign * h * T)[None], 0.3 * h)
             y, V = found.points[0], found.tangents[0]
             off = np.linalg.norm(y - x - sign * h * T)
-            if not (off < 0.3 * h and T @ V > np.cos(TURN) and self._solved(found)[0]):
+            # tangents a step apart turn by a quarter of a radian at most
+            if not (off < 0.3 * h and T @ V > np.cos(0.25) and self._solved(found)[0]):
                 h *= 0.5
-                if h < LEAST_STEP * self.size:
+                if h < 1e-6 * self.size:
                     self.broken = True
                     return np.array(nodes), False, -1, 0.0
                 continue

@@ -35,16 +35,8 @@ from creeping.shadow.panels import LENGTH_TOLERANCE, PanelCurve, fit_panels
 from creeping.shadow.piece_curves import EDGE_ON, PieceCurve, curves_on, edge_on
 from creeping.shadow.status import ATTACHED, CONCAVE, NO_RAY, OCCLUDED, STATUSES
 
-TILE = 0.05
-"""Longest sides of the triangles whose corners seed the curves, in body sizes."""
-LOOKED_AT = 193
-"""Points of a curve whose states are asked for."""
-OUTWARD = 1e-9
-"""Distance from the body, in its sizes, at which that is asked: along a straight generator F is 0 up to rounding."""
 MEET = 1e-7
 """Distance of the ends of two curves, in body sizes, up to which they meet, and least length of a curve."""
-MOST_PANELS = 1000
-"""Of a curve: one that takes more, as along a generator that the wave goes along, is lost, and takes minutes."""
 
 
 def piecewise_curves(
@@ -66,7 +58,8 @@ def piecewise_curves(
     SingularIncidenceError
         If a curve cannot be followed.
     """
-    pieces, tiles = pieces_of(body), tiles_of(body, TILE)
+    # corners of triangles with such sides, in body sizes, seed the curves
+    pieces, tiles = pieces_of(body), tiles_of(body, 0.05)
     level = tuple(k for k in range(len(pieces)) if edge_on(tiles, k, direction))
     curves, gaps = [], 0.0
     for number in range(len(pieces)):
@@ -120,7 +113,8 @@ def _finished(
     body: Any, piece: Any, number: int, direction: FloatArray, found: PieceCurve, n_points: int
 ) -> ShadowCurve:
     chords = np.linalg.norm(np.roll(found.nodes, -1, axis=0) - found.nodes, axis=1)
-    panels = fit_panels(piece, direction, found.nodes, chords, closed=found.closed, most=MOST_PANELS)
+    # one that takes more, as along a generator that the wave goes along, is lost, and takes minutes
+    panels = fit_panels(piece, direction, found.nodes, chords, closed=found.closed, most=1000)
     arclength = np.linspace(0.0, panels.length, n_points, endpoint=not found.closed)
     points, tangents, curvature, _ = moved_onto_lines(piece, direction, panels.at(arclength), reach=0.0, steps=0)
     arcs = _arcs(body, piece, direction, panels)
@@ -149,14 +143,17 @@ def _finished(
 def _states(body: Any, piece: Any, direction: FloatArray, points: FloatArray) -> IntArray:
     """Codes of points of a curve (n,)."""
     convex = moved_onto_lines(piece, direction, points, reach=0.0, steps=0).curvature > 0
-    hidden = occluded(body, points + OUTWARD * size(body) * unit_normals(piece, points), direction)
+    # asked a little off the body: along a straight generator F is 0 up to rounding
+    hidden = occluded(body, points + 1e-9 * size(body) * unit_normals(piece, points), direction)
     return np.where(convex, np.where(hidden, OCCLUDED, ATTACHED), CONCAVE)
 
 
 def _arcs(body: Any, piece: Any, direction: FloatArray, panels: PanelCurve) -> tuple[tuple[float, float, str], ...]:
     """Arclengths between which the state is the same, and its name; the last may come round."""
+    # points of a curve whose states are asked for
+    count = 193
     length = panels.length
-    s = (np.arange(LOOKED_AT) + 0.5) * length / LOOKED_AT
+    s = (np.arange(count) + 0.5) * length / count
     codes = _states(body, piece, direction, panels.at(s))
     if panels.closed:
         s, codes = np.append(s, s[0] + length), np.append(codes, codes[0])
@@ -196,13 +193,10 @@ def _joined(body: Any, curves: list[ShadowCurve]) -> tuple[ShadowCurve, ...]:
         gaps = [float(np.linalg.norm(curves[k].points[-side_] - x)) for k, side_ in others]
         if gaps and min(gaps) < MEET * size(body):
             goes_on[number, side] = others[int(np.argmin(gaps))][0]
-    out = []
-    for number, curve in enumerate(curves):
-        if curve.closed:
-            out.append(curve)
-            continue
-        out.append(replace(curve, goes_on=(goes_on[number, 0], goes_on[number, 1])))
-    return tuple(out)
+    return tuple(
+        curve if curve.closed else replace(curve, goes_on=(goes_on[number, 0], goes_on[number, 1]))
+        for number, curve in enumerate(curves)
+    )
 
 
 def launched_from(curves: tuple[ShadowCurve, ...], arcs: list[Arc], direction: FloatArray, n_rays: int) -> LaunchPoints:
@@ -226,10 +220,6 @@ def launched_from(curves: tuple[ShadowCurve, ...], arcs: list[Arc], direction: F
         first += count
     columns: tuple[Any, ...] = (points, arclength, curve_index, arc_index, spacing, closed, state)
     return LaunchPoints(direction[None], *(column[None] for column in columns))
-
-
-PROBE = 1e-4
-"""Distance from an edge, in body sizes, at which F tells a convex one from a concave one."""
 
 
 class EdgePart(NamedTuple):
@@ -292,7 +282,8 @@ def edge_tangents(x: FloatArray, first: FloatArray, second: FloatArray) -> Float
 def convex(body: Any, x: FloatArray, first: FloatArray, second: FloatArray) -> BoolArray:
     """Whether an edge is convex at its points (n,): F > 0 on both sides across the mean normal."""
     across = first - second
-    across = PROBE * size(body) * across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
+    # so near, F tells a convex edge from a concave one
+    across = 1e-4 * size(body) * across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
     return np.asarray((body.level(x + across) > 0) & (body.level(x - across) > 0))
 
 

@@ -37,7 +37,6 @@ from creeping.shadow.panels import PanelCurve, fit_panels
 
 FORBIDDEN = 1e-6
 """|n.q|/|q| at a critical point below which the incidence is refused."""
-MAX_SEEDS = 160
 
 
 @dataclass(frozen=True)
@@ -121,14 +120,15 @@ def critical_points(body: Surface, wave: FloatArray, mesh: Triangulation) -> Cri
 
 def _seeds(mesh: Triangulation, h: FloatArray, steep: FloatArray) -> list[int]:
     """Vertices whose |g| no neighbour undercuts, and those of least |g| and of least |g| near the line."""
+    most = 160
     lowest = steep.copy()
     for a, b in ((0, 1), (1, 2), (2, 0)):
         for i, j in ((mesh.triangles[:, a], mesh.triangles[:, b]), (mesh.triangles[:, b], mesh.triangles[:, a])):
             np.minimum.at(lowest, i, steep[j])
     minima = np.flatnonzero(steep <= lowest)
-    minima = minima[np.argsort(steep[minima])][: MAX_SEEDS // 2]
-    near = np.argsort(steep + 2 * np.abs(h))[: MAX_SEEDS // 4]
-    least = np.argsort(np.where(np.abs(h) < 0.99, steep, np.inf))[: MAX_SEEDS // 4]
+    minima = minima[np.argsort(steep[minima])][: most // 2]
+    near = np.argsort(steep + 2 * np.abs(h))[: most // 4]
+    least = np.argsort(np.where(np.abs(h) < 0.99, steep, np.inf))[: most // 4]
     return np.unique(np.concatenate([minima, near, least])).tolist()  # type: ignore[no-any-return]
 
 
@@ -166,17 +166,6 @@ def _solve(body: Surface, wave: FloatArray, points: FloatArray) -> FloatArray:
     return points
 
 
-MAX_DEPTH = 22
-"""Refinements of a triangle, each halving its edges."""
-MAX_TRIANGLES = 400_000
-
-
-NODES = (512, 16_384)
-"""Fewest and most nodes of a curve."""
-A_PANEL = 24
-"""Nodes on the shortest panel."""
-
-
 def followed(body: Surface, wave: FloatArray, mesh: Triangulation) -> tuple[LineNodes, tuple[PanelCurve, ...], float]:
     """Nodes of the line of a wave, (3,) or (4,), its curves in panels, and the least |n.q|/|q| at a critical point.
 
@@ -191,7 +180,8 @@ def followed(body: Surface, wave: FloatArray, mesh: Triangulation) -> tuple[Line
     points, spacing = [], []
     for curve in curves:
         shortest = float(np.min(np.diff(curve.breaks)))
-        count = int(np.clip(np.ceil(A_PANEL * curve.length / shortest), *NODES))
+        # 24 nodes on the shortest panel
+        count = int(np.clip(np.ceil(24 * curve.length / shortest), 512, 16_384))
         points.append(curve.at(curve.length * np.arange(count) / count))
         spacing.append(curve.length / count)
     x, T, kappa, _ = moved_onto_lines(body, wave, np.concatenate(points), reach=0.0, steps=0)
@@ -224,12 +214,13 @@ def _resolve(
 ) -> tuple[Triangulation, FloatArray]:
     """Split triangles until none can hide a part of n.q = 0; the mesh and n.q at its vertices."""
     h, g = incidence(body, wave, mesh.vertices)
-    for _ in range(MAX_DEPTH):
+    # edges are halved so often at most
+    for _ in range(22):
         unsafe = _unsafe(body, mesh, h, g)
         if not unsafe.any():
             _check_signs(critical, mesh, h)
             return mesh, h
-        if len(mesh.triangles) > MAX_TRIANGLES:
+        if len(mesh.triangles) > 400_000:
             break
         mesh = _split(body, mesh, unsafe)
         new_h, new_g = incidence(body, wave, mesh.vertices[len(h) :])

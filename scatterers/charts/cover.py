@@ -1,17 +1,16 @@
 """Monge charts (see `scatterers.charts.monge`), and a choice of them that covers a body, by lazy greedy set cover.
 
-h is followed from the centre of the square: over s q, s in STEPS, Newton steps h <- h - F/(g.N) start from the Taylor
+h is followed from the centre of the square: over s q, s to 1, Newton steps h <- h - F/(g.N) start from the Taylor
 series of the place before, dh/ds = -(g.q)/(g.N). Charts are chosen over a cloud of points of the body.
 
 With S the shape operator P H P/|grad F| and kappa the larger |eigenvalue|, a chart about a point of the cloud is as
-wide as n.N >= LEAST and w max(kappa) <= BENT allow on its square widened by the margin. It covers the points with
-n.N >= FACING and |q.E1|, |q.E2| <= w - gap, ``gap`` being how far other points of the body may be from a point of the
+wide as n.N >= LEAST and w max(kappa) <= 0.9 allow on its square widened by the margin. It covers the points with
+n.N >= 0.45 and |q.E1|, |q.E2| <= w - gap, ``gap`` being how far other points of the body may be from a point of the
 cloud: so what lies between is covered too. Gaps are measured by `probes`, points between those of the cloud.
 
 The greedy rule is that of [C79]; Derivations, B3.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from heapq import heapify, heapreplace
 
@@ -20,12 +19,9 @@ from scipy.sparse import coo_array
 from scipy.spatial import cKDTree
 
 from creeping._typing import BoolArray, FloatArray, IntArray
-from scatterers.kernels.charts import CHART, FIRST
-
-Field = Callable[[FloatArray], FloatArray]
-STEPS = (0.3, 0.55, 0.75, 0.9, 1.0)
-# n.N below which a graph over the tangent plane is not followed
-STEEP = 0.05
+from scatterers.body import tangents
+from scatterers.charts.samples import Field, step_onto
+from scatterers.kernels.charts import ATLAS
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +62,7 @@ class MongeCharts:
         h, slope = np.zeros(q.shape[:-1]), np.zeros(q.shape[:-1])
         bend = self.half**2 * np.einsum("...i,...ij,...j->...", s, self.bend, s)
         last = 0.0
-        for step in STEPS:
+        for step in (0.3, 0.55, 0.75, 0.9, 1.0):
             ds = step - last
             h = h + ds * (slope + 0.5 * ds * bend)
             h, moved, g = self._newton(step * q, h, 2 if step < 1 else 12)
@@ -76,7 +72,10 @@ class MongeCharts:
         lost = ~(moved <= 1e-9 * self.half)
         if lost.any():
             # beyond the reach of a chart there may be nothing over a point: any place on the body keeps rays finite
-            x[lost] = _nearest(self.level, self.gradient, x[lost], np.broadcast_to(self.half, lost.shape)[lost])
+            y, reach = x[lost], 0.25 * np.broadcast_to(self.half, lost.shape)[lost]
+            for _ in range(20):
+                y = y + np.nan_to_num(step_onto(self.level(y), self.gradient(y), reach)[0])
+            x[lost] = y
         return np.asarray(x)
 
     def _newton(self, q: FloatArray, h: FloatArray, most: int) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -94,27 +93,14 @@ class MongeCharts:
 
     @staticmethod
     def _lean(g: FloatArray, n: FloatArray) -> FloatArray:
-        """g.N, kept away from zero."""
-        return np.asarray(np.maximum(np.sum(g * n, axis=-1), STEEP * np.linalg.norm(g, axis=-1) + 1e-300))
+        """g.N, kept away from zero: with less a graph over the tangent plane is not followed."""
+        return np.asarray(np.maximum(np.sum(g * n, axis=-1), 0.05 * np.linalg.norm(g, axis=-1) + 1e-300))
 
 
-def _nearest(level: Field, gradient: Field, x: FloatArray, reach: FloatArray) -> FloatArray:
-    for _ in range(20):
-        g = gradient(x)
-        norm = np.linalg.norm(g, axis=-1) + 1e-300
-        x = x - (np.clip(level(x) / norm, -0.25 * reach, 0.25 * reach) / norm)[:, None] * g
-    return x
-
-
-# least n.N on the widened square, on points that a chart covers, and on points that look for their chart
-LEAST, FACING, VALID = 0.2, 0.45, 0.4
-# largest w max(kappa)
-BENT = 0.9
-# distance of candidates, in radii of curvature, and the largest, in diagonals of the body's box
-APART, FARTHEST = 0.25, 0.1
-# how much a chart that meets another sheet, or has no height, is shrunk, and how many times
-SHRINK, SHRINKS = 0.93, 8
-ROUNDS = 12
+# least n.N on the widened square, and on points that look for their chart
+LEAST, VALID = 0.2, 0.4
+# how much a chart that meets another sheet, or has no height, is shrunk
+SHRINK = 0.93
 
 
 def probes(level: Field, gradient: Field, cloud: FloatArray, *, seed: int) -> FloatArray:
@@ -195,12 +181,12 @@ class _Cloud:
         return np.asarray(np.abs(self.curvatures).max(axis=-1))
 
     def spread(self, among: IntArray, apart: float) -> IntArray:
-        """Some of the points ``among``: two are so many of the smaller radius of curvature apart, or FARTHEST."""
+        """Some of the points ``among``: two are so many smaller radii of curvature apart, or a tenth of the box."""
         alive = np.zeros(len(self.points), dtype=bool)
         alive[among] = True
         chosen = []
         extent = float(np.linalg.norm(np.ptp(self.points, axis=0)))
-        radius = apart / np.maximum(self.bent, apart / (FARTHEST * extent))
+        radius = apart / np.maximum(self.bent, apart / (0.1 * extent))
         for k in among:
             if alive[k]:
                 chosen.append(k)
@@ -215,10 +201,7 @@ def _principal(gradient: FloatArray, hessian: FloatArray) -> tuple[FloatArray, F
     """Frames (n, 3, 3), rows E1, E2, N, and the curvatures (n, 2) along E1 and E2."""
     size = np.linalg.norm(gradient, axis=-1)
     n = gradient / size[:, None]
-    helper = np.eye(3)[np.argmin(np.abs(n), axis=-1)]
-    e = np.cross(n, helper)
-    e /= np.linalg.norm(e, axis=-1, keepdims=True)
-    f = np.cross(n, e)
+    e, f = tangents(n)
     a, b, c = (np.einsum("ni,nij,nj->n", p, hessian, q) / size for p, q in ((e, e), (e, f), (f, f)))
     angle = 0.5 * np.arctan2(2 * b, a - c)
     cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
@@ -243,20 +226,22 @@ class _Candidates:
         """Charts about points of the cloud, half widths ``longest`` at most."""
         from scatterers.kernels.charts import grow
 
+        # as often as a chart that meets another sheet, or has no height, is shrunk
+        times = 8
         cloud = self.cloud
         normals = np.ascontiguousarray(cloud.axes[:, 2])
         graph = cloud.points, normals, cloud.bent, cloud.first, cloud.neighbours, cloud.gap
-        for attempt in range(SHRINKS):
+        for attempt in range(times):
             if not len(start):
                 return
             axes = np.ascontiguousarray(cloud.axes[start])
             half, begin, covered, heights = grow(
-                start, axes, longest * self.wider, *graph, LEAST, FACING, BENT * self.wider, self.wider
+                start, axes, longest * self.wider, *graph, LEAST, 0.45, 0.9 * self.wider, self.wider
             )
             lists = np.split(covered, begin[1:-1])
             # corners are where a point of the cloud may be too far to tell
             torn = self._torn(cloud.graphs(start, half), 2)
-            good = ~torn if attempt < SHRINKS - 1 else np.ones(len(start), dtype=bool)
+            good = ~torn if attempt < times - 1 else np.ones(len(start), dtype=bool)
             self.start = np.concatenate([self.start, start[good]])
             self.half = np.concatenate([self.half, half[good]])
             self.heights = np.concatenate([self.heights, heights[good]])
@@ -343,9 +328,10 @@ def covered_by(
         If no cover is found; with how much is left.
     """
     cloud = _Cloud.of(level, gradient, hessian, points)
-    candidates = _Candidates(cloud, margin)
-    fresh, before = cloud.spread(np.arange(len(points)), APART), len(points)
-    for _ in range(ROUNDS):
+    # distance of candidates in radii of curvature
+    candidates, apart = _Candidates(cloud, margin), 0.25
+    fresh, before = cloud.spread(np.arange(len(points)), apart), len(points)
+    for _ in range(12):
         candidates.add(fresh, np.full(len(fresh), np.inf))
         which = candidates.chosen()
         graphs = cloud.graphs(candidates.start[which], candidates.half[which])
@@ -362,7 +348,7 @@ def covered_by(
         if not bad and missed.sum() >= before:
             break
         before = missed.sum()
-        fresh = cloud.spread(np.flatnonzero(missed), 0.5 * APART)
+        fresh = cloud.spread(np.flatnonzero(missed), 0.5 * apart)
     first = int(np.argmax(missed))
     raise ValueError(
         f"no charts for {int(missed.sum())} of {len(points)} points of the body (first near "
@@ -398,7 +384,7 @@ def _located(candidates: _Candidates, graphs: MongeCharts, which: list[int]) -> 
     code, chart = pairs // number, pairs % number
     voxel, begin, count = np.unique(code, return_index=True, return_counts=True)
     # behind the charts the table, an empty list, then that of each voxel with its length before it
-    first = FIRST + CHART * number
+    first = ATLAS.charts + ATLAS.width * number
     lists = first + int(np.prod(shape))
     entry = lists + 1 + begin + np.arange(len(voxel))
     table = np.full(int(np.prod(shape)), float(lists))

@@ -23,8 +23,9 @@ import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.body import cached
-from scatterers.charts.cover import Field, MongeCharts, covered_by, probes
-from scatterers.kernels.charts import CHART, FIRST, LEAN, OUTSIDE, VOXELS
+from scatterers.charts.cover import MongeCharts, covered_by, probes
+from scatterers.charts.samples import Field
+from scatterers.kernels.charts import ATLAS
 from scatterers.kernels.compiled import Compiled, call
 
 
@@ -52,12 +53,6 @@ class MongeChart:
         return np.asarray(2 * self.graph.half * (e.T - n[:, None] * slope[..., None, :]))
 
 
-# times that the cloud is completed where the atlas misses a point between
-ROUNDS = 4
-# points that determine neighbours
-FEWEST = 16
-
-
 @dataclass(frozen=True, eq=False)
 class MongeAtlas:
     """Monge charts that cover a body.
@@ -75,7 +70,7 @@ class MongeAtlas:
     @property
     def margin(self) -> float:
         """How far charts reach beyond their unit squares on every side, in half widths of these."""
-        return float(self.parameters[OUTSIDE]) - 1.0
+        return float(self.parameters[ATLAS.outside]) - 1.0
 
     @classmethod
     def covering(
@@ -100,7 +95,8 @@ class MongeAtlas:
             or it has thin or sharp parts.
         """
         cloud = _checked(cloud)
-        for _ in range(ROUNDS):
+        # times that the cloud is completed where the atlas misses a point between
+        for _ in range(4):
             atlas = cls(*covered_by(level, gradient, hessian, cloud, margin))
             # points of other places than those that the charts were chosen by
             other = probes(level, gradient, cloud, seed=1)
@@ -134,11 +130,11 @@ class MongeAtlas:
         chart, uv = np.empty(n, np.int64), np.empty((2, n))
         call(self.compiled.function, x, normal, chart, uv, np.empty((6, n)), self.parameters)
         # the locator takes a chart for every point; by these it is known whether it is one
-        row = self.parameters[FIRST : int(self.parameters[VOXELS])].reshape(-1, CHART)[chart]
+        row = self.parameters[ATLAS.charts : int(self.parameters[ATLAS.voxels])].reshape(-1, ATLAS.width)[chart]
         height = np.einsum("in,ni->n", x, row[:, 9:12]) - np.einsum("ni,ni->n", row[:, :3], row[:, 9:12])
         with np.errstate(invalid="ignore"):
             lean = np.einsum("in,ni->n", normal, row[:, 9:12]) / np.linalg.norm(normal, axis=0)
-        none = ~((lean >= self.parameters[LEAN]) & (height >= row[:, 13]) & (height <= row[:, 14]))
+        none = ~((lean >= self.parameters[ATLAS.lean]) & (height >= row[:, 13]) & (height <= row[:, 14]))
         chart[none], uv[:, none] = -1, np.nan
         return chart.reshape(np.shape(points)[:-1]), uv.T.reshape(*np.shape(points)[:-1], 2)
 
@@ -169,9 +165,11 @@ class MongeAtlas:
 
 
 def _checked(cloud: FloatArray) -> FloatArray:
+    # points that determine neighbours
+    fewest = 16
     cloud = np.ascontiguousarray(cloud, dtype=float)
-    if cloud.ndim != 2 or cloud.shape[1] != 3 or len(cloud) < FEWEST:
-        raise ValueError(f"the cloud has shape {cloud.shape}; give (n, 3) with at least {FEWEST} points of the body")
+    if cloud.ndim != 2 or cloud.shape[1] != 3 or len(cloud) < fewest:
+        raise ValueError(f"the cloud has shape {cloud.shape}; give (n, 3) with at least {fewest} points of the body")
     if bad := int(np.sum(~np.all(np.isfinite(cloud), axis=-1))):
         raise ValueError(f"{bad} of {len(cloud)} points of the cloud are not finite; leave them out")
     return cloud

@@ -17,15 +17,6 @@ import numpy as np
 from creeping._typing import FloatArray
 from scatterers.kernels.compiled import Compiled, evaluated
 
-# cells of the first grid, along the side of a cube of the box's volume
-COARSE = 24
-# nodes of the largest grid
-MOST = 30_000_000
-NEWTON = 30
-# a Newton step this small, in units of the longest, squares to rounding
-SMALL = 1e-7
-
-
 Field = Callable[[FloatArray], FloatArray]
 
 
@@ -48,7 +39,8 @@ def body_cloud(level: Field, gradient: Field, box: FloatArray, count: int) -> Fl
     side = box[1] - box[0]
     # a thin body passes between the nodes of a coarser grid
     longest = 0.4 * float(side.min())
-    spacing = min(float(np.prod(side)) ** (1 / 3) / COARSE, longest)
+    # 24 cells along the side of a cube of the box's volume at first
+    spacing = min(float(np.prod(side)) ** (1 / 3) / 24, longest)
     for _ in range(4):
         samples = sampled(level, box, spacing)
         points = sign_changes(samples.values, samples.origin, samples.spacing)
@@ -80,11 +72,12 @@ def onto(level: Field, gradient: Field, points: FloatArray, reach: float) -> Flo
     """
     points = points.copy()
     active = np.arange(len(points))
-    for _ in range(NEWTON):
+    for _ in range(30):
         x = points[active]
         step, distance = step_onto(level(x), gradient(x), reach)
         points[active] = x + step
-        active = active[~(np.abs(distance) < SMALL * reach)]
+        # a step so small squares to rounding
+        active = active[~(np.abs(distance) < 1e-7 * reach)]
         if not len(active):
             return points
     raise ValueError(
@@ -172,12 +165,13 @@ def sampled(level: Field, box: FloatArray, spacing: float) -> Samples:
     Raises
     ------
     ValueError
-        If it would have more than `MOST` nodes.
+        If it would have more than 30 million nodes.
     """
+    most = 30_000_000
     side = box[1] - box[0]
-    if np.prod(side / spacing + 4) > MOST:
+    if np.prod(side / spacing + 4) > most:
         raise ValueError(
-            f"a spacing of {spacing:.3g} L asks for a grid of more than {MOST} nodes; give a larger one: "
+            f"a spacing of {spacing:.3g} L asks for a grid of more than {most} nodes; give a larger one: "
             "larger tiles, fewer points, or a smaller box"
         )
     # the shift keeps nodes off planes of symmetry, where F is often exactly 0

@@ -42,10 +42,7 @@ from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.body import Body, Levelled, SphereMapped, cached, polar_angles
 from scatterers.charts.samples import Samples
 from scatterers.kernels.compiled import Compiled, evaluated, inverted, mapped
-from scatterers.kernels.tensor import CENTRE, DEGREE, HEADER, REACH
-
-# centroids this near to a parallel of the axis, in half widths, make no spine
-UPRIGHT = 0.01
+from scatterers.kernels.tensor import AT, DEGREE, REACH
 
 
 class SpaceLevel(Protocol):
@@ -96,22 +93,16 @@ class Spine:
         return np.moveaxis(np.asarray(polynomial.polyval(t.clip(-REACH, REACH), self.shifts)), 0, -1)
 
     def slope(self, points: FloatArray) -> FloatArray:
-        """Derivative of the shift along the axis, without unit: (..., 3) -> (..., 3)."""
+        """Derivative of the shift along the axis at points w or x, without unit: (..., 3) -> (..., 3)."""
         t: FloatArray = (np.asarray(points, dtype=float)[..., self.axis] - self.middle) / self.half
         found = polynomial.polyval(t.clip(-REACH, REACH), polynomial.polyder(self.shifts)) / self.half
         return np.moveaxis(np.where(np.abs(t) > REACH, 0.0, found), 0, -1)
-
-    def pulled(self, points: FloatArray, gradient: FloatArray) -> FloatArray:
-        """DT^T grad F at points w or x: (..., 3) -> (..., 3)."""
-        out = gradient.copy()
-        out[..., self.axis] += np.sum(self.slope(points) * gradient, axis=-1)
-        return out
 
     @classmethod
     def through(cls, inside: BoolArray, origin: FloatArray, spacing: FloatArray) -> "Spine":
         """Least-squares spine of the slices of the nodes inside a body, weighted by their areas.
 
-        A shift within `UPRIGHT` of a constant, by the weighted mean square, is left out.
+        A shift within a hundredth of the half width of a constant, by the weighted mean square, is left out.
         """
         where = np.argwhere(inside)
         low, high = where.min(0), where.max(0)
@@ -127,7 +118,7 @@ class Spine:
         for across in (axis - 1, axis - 2):
             centroid = np.bincount(where[:, axis], where[:, across])[slices] / area * spacing[across] + origin[across]
             off = centroid - np.average(centroid, weights=area)
-            if np.sqrt(np.average(off**2, weights=area)) > UPRIGHT * half[across]:
+            if np.sqrt(np.average(off**2, weights=area)) > 0.01 * half[across]:
                 shifts[: degree + 1, across] = polynomial.polyfit(t, centroid, degree, w=root)
         return cls(axis, float(middle[axis]), float(half[axis]), shifts)
 
@@ -168,7 +159,9 @@ class RadialMap(SphereMapped):
         """g.(w - c) at points of the body, positive where rays leave it: (..., 3) -> (...)."""
         _, gradient, _ = evaluated(self.compiled_level, points)
         y = points - self.spine.shift(points) - self.centre
-        return np.asarray(np.sum(self.spine.pulled(points, gradient) * y, axis=-1))
+        # g.y = grad F.(DT y)
+        along = y + y[..., self.spine.axis, None] * self.spine.slope(points)
+        return np.asarray(np.sum(gradient * along, axis=-1))
 
     @cached_property
     def parameters(self) -> FloatArray:
@@ -208,10 +201,6 @@ class RadialMap(SphereMapped):
         return Compiled(locate, "locator", self.parameters)
 
 
-CHECKED = 20000
-"""Points of the body at which the centre is checked."""
-
-
 def star_map(space: SpaceLevel, samples: Samples, centre: FloatArray | None) -> tuple[RadialMap | None, str]:
     """Sphere map with a spine if the body is not upright and that does, without one otherwise.
 
@@ -243,7 +232,8 @@ def _hidden(sphere_map: RadialMap, points: FloatArray) -> str:
     inside = np.all(centre > box[0]) and np.all(centre < box[1])
     if not inside or not evaluated(sphere_map.compiled_level, centre)[0] < 0:
         return f"the centre {where} is not inside the body; {remedy}"
-    points = points[:: -(-len(points) // CHECKED)]
+    # at 20 000 of them
+    points = points[:: -(-len(points) // 20_000)]
     hidden = int(np.sum(~(sphere_map.facing(points) > 0)))
     if not hidden:
         return ""
@@ -365,12 +355,6 @@ if TYPE_CHECKING:
     from scatterers.charts.monge import MongeAtlas
 
 
-CLOUDS = (25_000, 100_000)
-"""Points of the body by which charts are chosen, the more if the fewer do not do."""
-MARGIN = 0.4
-"""How far charts reach beyond their squares: fewer charts than with more, for maps of at least 15 nodes a side."""
-
-
 class LevelBody(Levelled, Body):
     """Base of bodies given by a level function F; a subclass calls `_place` with F and defines ``_identity``."""
 
@@ -423,7 +407,7 @@ class LevelBody(Levelled, Body):
         """Compiled level evaluator."""
         if self._map is not None:
             return self._map.compiled_level
-        return Compiled(self._space.sources["level"], "level", self._space.flat(np.zeros(HEADER - CENTRE)))
+        return Compiled(self._space.sources["level"], "level", self._space.flat(np.zeros(AT.end - AT.centre)))
 
     @cached
     def atlas(self) -> "CubeSphereAtlas | MongeAtlas":
@@ -453,10 +437,11 @@ class LevelBody(Levelled, Body):
         if self._no_charts:
             raise ValueError(self._no_charts)
         failure = ""
-        for count in CLOUDS:
+        for count in (25_000, 100_000):
             cloud = body_cloud(self.level, self.gradient, self._bounds, count)
             try:
-                return MongeAtlas.covering(self.level, self.gradient, self.hessian, cloud, margin=MARGIN)
+                # fewer charts than with a larger margin, for maps of at least 15 nodes a side
+                return MongeAtlas.covering(self.level, self.gradient, self.hessian, cloud, margin=0.4)
             except ValueError as error:
                 # parts may be finer than the points
                 failure = str(error)

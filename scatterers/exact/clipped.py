@@ -22,27 +22,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from creeping._typing import FloatArray, IntArray
-from scatterers.body import Crease, Levelled
+from scatterers.body import Crease, Levelled, normals_of
 from scatterers.charts.samples import Field, sampled, towards
 from scatterers.triangles.regions import curves
 from scatterers.triangles.topology import cut, edges_of
-
-NEWTON = 20
-SHALLOW = 1e-3
-"""Angle between normals, radians, below which both levels together do not tell the place."""
-EDGE, JUMP = 1e-5, 1e-6
-"""Angle of the normals, radians, that makes an edge, and change of the curvatures, relative, that makes a joint."""
-TOUCHING = 1e-12
-"""Singular values of gradients, relative, below which pieces touch there: rounding of F would be divided by them."""
-THIN = 0.5
-"""Points of a crease closer than this, in the triangulation's spacing, are left out."""
-# corners of the six tetrahedra of a cube, as steps from its first node
-STEPS = np.array(
-    [
-        np.cumsum([np.zeros(3, dtype=np.int64), *(np.eye(3, dtype=np.int64)[list(p)])], axis=0)
-        for p in permutations(range(3))
-    ]
-)
 
 
 class Clipped(NamedTuple):
@@ -102,8 +85,9 @@ def _on_both(
 ) -> FloatArray:
     """Points (n, 3) between a and b where the piece changes."""
     middle = 0.5 * (a + b)
-    na, nb = (_normals(pieces, middle, k) for k in (ka, kb))
-    steep = np.linalg.norm(np.cross(na, nb), axis=-1) > SHALLOW
+    na, nb = (normals_of(pieces, middle, k) for k in (ka, kb))
+    # at a smaller angle both levels together do not tell the place
+    steep = np.linalg.norm(np.cross(na, nb), axis=-1) > 1e-3
     found = middle.copy()
     found[steep] = _on_all(pieces, middle[steep], np.stack([ka, kb], axis=-1)[steep])
     # where the surfaces do not meet within a cell, and where they touch; the sides of an acute edge cut it short
@@ -120,30 +104,23 @@ def _on_both(
 
 def _on_all(pieces: Sequence[Levelled], points: FloatArray, which: IntArray) -> FloatArray:
     """Points (n, 3) moved to where the levels of their pieces (n, k) are all 0."""
+    # relative singular values below which pieces touch: rounding of F would be divided by them
+    touching = 1e-12
     points = points.copy()
     for numbers in np.unique(which, axis=0):
         mine = np.all(which == numbers, axis=1)
         x = points[mine]
-        for _ in range(NEWTON):
+        for _ in range(20):
             value = np.stack([pieces[k].level(x) for k in numbers], axis=-1)
             slope = np.stack([pieces[k].gradient(x) for k in numbers], axis=-2)
-            x = x - (np.linalg.pinv(np.nan_to_num(slope), rcond=TOUCHING) @ np.nan_to_num(value)[..., None])[..., 0]
+            x = x - (np.linalg.pinv(np.nan_to_num(slope), rcond=touching) @ np.nan_to_num(value)[..., None])[..., 0]
         points[mine] = x
     return points
 
 
-def _normals(pieces: Sequence[Levelled], points: FloatArray, which: IntArray) -> FloatArray:
-    found = np.zeros(points.shape)
-    for k in np.unique(which):
-        gradient = pieces[k].gradient(points[which == k])
-        with np.errstate(all="ignore"):
-            found[which == k] = gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)
-    return found
-
-
 def normals(pieces: Sequence[Levelled], corners: FloatArray, which: IntArray) -> FloatArray:
     """Unit normals (m, 3, 3) of pieces (m,) at the corners (m, 3, 3), L, of their triangles."""
-    return _normals(pieces, corners.reshape(-1, 3), np.repeat(which, 3)).reshape(corners.shape)
+    return normals_of(pieces, corners.reshape(-1, 3), np.repeat(which, 3)).reshape(corners.shape)
 
 
 def creases(pieces: Sequence[Levelled], clipped: Clipped, spacing: float) -> list[Crease]:
@@ -156,13 +133,14 @@ def creases(pieces: Sequence[Levelled], clipped: Clipped, spacing: float) -> lis
     between = sides[:, 0] != sides[:, 1]
     found = []
     for (a, b), chain, _ in curves(edges.ends[between], sides[between], len(clipped.vertices)):
-        points = _thinned(clipped.vertices[chain], THIN * spacing)
+        # points closer than half the spacing are left out
+        points = _thinned(clipped.vertices[chain], 0.5 * spacing)
         if np.sum(np.linalg.norm(np.diff(points, axis=0), axis=1)) < spacing:
             continue
-        na, nb = (_normals(pieces, points, np.full(len(points), k)) for k in (a, b))
+        na, nb = (normals_of(pieces, points, np.full(len(points), k)) for k in (a, b))
         turn = np.arctan2(np.linalg.norm(np.cross(na, nb), axis=-1), np.sum(na * nb, axis=-1))
         angle = float(np.nanmax(turn))
-        kind: Literal["edge", "joint", "seam"] = "edge" if angle > EDGE else "joint"
+        kind: Literal["edge", "joint", "seam"] = "edge" if angle > 1e-5 else "joint"
         # where pieces that touch end on a third one, their end is not known as well as the rest
         within = points[1:-1] if len(points) > 2 else points
         if kind == "joint" and not _bent(pieces[a], pieces[b], within):
@@ -181,7 +159,7 @@ def _bent(one: Levelled, other: Levelled, points: FloatArray) -> bool:
         flat = np.eye(3) - n * n.swapaxes(1, 2)
         of_each.append(flat @ piece.hessian(points) @ flat / slope)
     largest = max(float(np.max(np.abs(shape))) for shape in of_each)
-    return bool(np.max(np.abs(of_each[0] - of_each[1])) > JUMP * largest)
+    return bool(np.max(np.abs(of_each[0] - of_each[1])) > 1e-6 * largest)
 
 
 def _thinned(points: FloatArray, apart: float) -> FloatArray:
@@ -201,6 +179,13 @@ def march(level: Field, box: FloatArray, spacing: float) -> tuple[FloatArray, In
     ValueError
         If the grid is too large, or F has no sign change on it.
     """
+    # corners of the six tetrahedra of a cube, as steps from its first node
+    steps = np.array(
+        [
+            np.cumsum([np.zeros(3, dtype=np.int64), *(np.eye(3, dtype=np.int64)[list(p)])], axis=0)
+            for p in permutations(range(3))
+        ]
+    )
     samples = sampled(level, box, spacing)
     inside = samples.values < 0
     corners = [inside[i : i - 1 or None, j : j - 1 or None, k : k - 1 or None] for i, j, k in np.ndindex(2, 2, 2)]
@@ -208,7 +193,7 @@ def march(level: Field, box: FloatArray, spacing: float) -> tuple[FloatArray, In
     cubes = np.argwhere((total > 0) & (total < 8))
     if not len(cubes):
         raise ValueError("F has no sign change in its box: no body, or tiles larger than it")
-    nodes = (cubes[:, None, None] + STEPS).reshape(-1, 4, 3)
+    nodes = (cubes[:, None, None] + steps).reshape(-1, 4, 3)
     number = np.asarray(np.ravel_multi_index(tuple(np.moveaxis(nodes, -1, 0)), inside.shape), dtype=np.int64)
     below = inside.ravel()[number]
     count = below.sum(axis=1)

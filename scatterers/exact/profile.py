@@ -27,13 +27,8 @@ import numpy as np
 
 from creeping._typing import FloatArray
 from scatterers.body import finite
-from scatterers.kernels.revolved import CONIC, SPLINE
 
-OFF = 1e-9
-"""How far from its conic an end may be, in its semi-axes."""
 DEGREE = 5
-MOST_TURN = np.pi / 2
-"""Turn of the tangent between two points beyond which a profile is too coarse."""
 
 
 Pair = tuple[float, float]
@@ -63,8 +58,8 @@ class Segment:
         """Unit tangents: (n,) to (n, 2)."""
         raise NotImplementedError
 
-    def shapes(self) -> tuple[float, list[FloatArray]]:
-        """Kind, and parameters of all parts between `turns`, or of the one that all share; see `kernels.revolved`."""
+    def shapes(self) -> tuple[bool, list[FloatArray]]:
+        """Whether it is a spline; parameters of all parts between `turns`, or of the one that all share."""
         raise NotImplementedError
 
     def reversed(self) -> "Segment":
@@ -102,10 +97,10 @@ class Line(Segment):
         along = np.subtract(self.end, self.start)
         return np.broadcast_to(along / math.hypot(*along), (*np.shape(u), 2)).copy()
 
-    def shapes(self) -> tuple[float, list[FloatArray]]:
+    def shapes(self) -> tuple[bool, list[FloatArray]]:
         """Conic with A = C = 0."""
         tz, tr = self.tangent(np.zeros(1))[0]
-        return CONIC, [np.array([0.0, tz, 0.0, -tr, -tz * self.start[1], self.start[0]])]
+        return False, [np.array([0.0, tz, 0.0, -tr, -tz * self.start[1], self.start[0]])]
 
     def reversed(self) -> "Line":
         """The same from its end to its start."""
@@ -151,7 +146,8 @@ class Arc(Segment):
             raise ValueError(f"semi-axes {(b, a)} of an arc are not positive")
         for name, (z, r) in (("start", self.start), ("end", self.end)):
             off = abs(math.hypot((z - self.centre[0]) / b, (r - self.centre[1]) / a) - 1)
-            if off > OFF:
+            # how far from its conic an end may be, in its semi-axes
+            if off > 1e-9:
                 raise ValueError(
                     f"{name} {(z, r)} is not on the arc about {self.centre} with semi-axes {(b, a)}: off by {off:.2g} "
                     "of them; give ends that are"
@@ -202,12 +198,12 @@ class Arc(Segment):
         along = np.stack([b * (r - rc) / a, -a * (z - zc) / b], axis=-1) * (1.0 if self.convex else -1.0)
         return np.asarray(along / np.linalg.norm(along, axis=-1, keepdims=True))
 
-    def shapes(self) -> tuple[float, list[FloatArray]]:
+    def shapes(self) -> tuple[bool, list[FloatArray]]:
         """Conic with D = 0."""
         (b, a), (zc, rc) = self._axes, self.centre
         m = math.sqrt(a * b) * (1 if self.convex else -1)
         rest = 0.5 * m * (rc / a - 1) * (rc / a + 1)
-        return CONIC, [np.array([m / a**2, -m * rc / a**2, m / b**2, 0.0, rest, zc])]
+        return False, [np.array([m / a**2, -m * rc / a**2, m / b**2, 0.0, rest, zc])]
 
     def reversed(self) -> "Arc":
         """The same from its end to its start."""
@@ -299,7 +295,7 @@ class SplineSegment(Segment):
         self._breaks, self._bases, self._coefficients = _fitted(points, poles)
         heading = np.unwrap(np.arctan2(*self.tangent(np.linspace(0, 1, 8 * len(points) + 1)).T[::-1]))
         at_breaks = np.interp(self.turns, np.linspace(0, 1, len(heading)), heading)
-        if (worst := float(np.max(np.abs(np.diff(at_breaks))))) > MOST_TURN:
+        if (worst := float(np.max(np.abs(np.diff(at_breaks))))) > np.pi / 2:
             raise ValueError(
                 f"the profile turns by {np.degrees(worst):.0f} degrees between two of its {len(points)} points; "
                 "give more points, or name the corners"
@@ -346,14 +342,14 @@ class SplineSegment(Segment):
         along = self._derivative(u, 1)
         return np.asarray(along / np.linalg.norm(along, axis=-1, keepdims=True))
 
-    def shapes(self) -> tuple[float, list[FloatArray]]:
+    def shapes(self) -> tuple[bool, list[FloatArray]]:
         """Spline: of each interval its ends and coefficients."""
         rows = []
         for low, high, base, by_power in zip(
             self._breaks, self._breaks[1:], self._bases, self._coefficients, strict=False
         ):
             rows.append(np.concatenate([[low - base, high - base], by_power[:, 0], by_power[:, 1]]))
-        return SPLINE, rows
+        return True, rows
 
     def reversed(self) -> "SplineSegment":
         """The same from its end to its start."""

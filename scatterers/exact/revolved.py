@@ -36,28 +36,13 @@ from scatterers.body import SHARP, Body, Crease, Levelled, NoCharts, Piece, cach
 from scatterers.charts.star import CubeSphereAtlas, RadialMap, Spine
 from scatterers.exact.profile import Segment
 from scatterers.kernels.compiled import Compiled, evaluated
-from scatterers.kernels.revolved import ROWS, SPLINE, WIDTH, evaluate, numbers, value_and_gradient
-from scatterers.kernels.tensor import HEADER
+from scatterers.kernels.revolved import AT, ROW, evaluate, numbers, value_and_gradient
+from scatterers.kernels.tensor import AT as OF_MAP
 
 SMALLEST = 1e-6
 """Turn of the tangent, radians, below which a corner is a joint, and an end on the axis no tip."""
-SAME = 1e-12
-"""Distance, in the body's extent, within which two segments are parts of one."""
-ON_CREASE = 360
-"""Points on a circle that is a crease."""
-SIDE = 0.75
-"""Steps along and across the profile in edges of tiles: the third side is then 1.06 edges at most."""
-SECTORS = 6
-"""Squares about the axis, of affine images twice as many."""
-MOST_TILES = 1e7
 DENSE = 513
 """Points of a segment by which its length is measured."""
-FEWEST = 6
-"""Points on a ring, however short."""
-STEEP = 1.1
-"""Turn of the profile along a square, radians, at most."""
-SLACK = 0.1
-"""By which the box of the map is wider than the body, in its half widths."""
 
 
 class Squares(NamedTuple):
@@ -113,14 +98,19 @@ def _turned(w: FloatArray, r: FloatArray, phi: FloatArray) -> FloatArray:
 
 
 def _cuts(segment: Segment) -> FloatArray:
-    """Values of u from 0 to 1 between which a segment turns by no more than STEEP."""
-    u = np.linspace(0, 1, DENSE)
-    tangent = segment.tangent(u)
-    sine = tangent[:-1, 0] * tangent[1:, 1] - tangent[:-1, 1] * tangent[1:, 0]
-    turned = np.concatenate([[0.0], np.cumsum(np.abs(sine))])
-    count = max(1, math.ceil(turned[-1] / STEEP))
-    inner = np.interp(np.arange(1, count) / count * turned[-1], turned, u)
-    return np.concatenate([[0.0], inner, [1.0]])
+    """Values of u from 0 to 1 between which a segment turns by 1.1 radians at most."""
+    tangent = segment.tangent(np.linspace(0, 1, DENSE))
+    return _evenly(np.abs(tangent[:-1, 0] * tangent[1:, 1] - tangent[:-1, 1] * tangent[1:, 0]), 1.1)
+
+
+def _evenly(parts: FloatArray, most: float) -> FloatArray:
+    """Values of u that share what adds up along a segment evenly, at most so much each, from its parts at equal u."""
+    along = np.concatenate([[0.0], np.cumsum(parts)])
+    count = max(1, math.ceil(along[-1] / most))
+    found = np.interp(np.linspace(0, along[-1], count + 1), along, np.linspace(0, 1, len(along)))
+    # of a straight line nothing adds up
+    found[0], found[-1] = 0.0, 1.0
+    return np.asarray(found)
 
 
 class Revolved(Levelled, Body):
@@ -174,9 +164,9 @@ class Revolved(Levelled, Body):
         rows, shapes = [], []
         kept = [(segment, *segment.shapes()) for segment in segments]
         # one conic alone needs no search
-        turns = [s.turns if kind == SPLINE or len(kept) > 1 else s.turns[[0, -1]] for s, kind, _ in kept]
-        at = ROWS + WIDTH * sum(len(u) - 1 for u in turns)
-        for piece, ((segment, kind, parts), u) in enumerate(zip(kept, turns, strict=True)):
+        turns = [s.turns if splined or len(kept) > 1 else s.turns[[0, -1]] for s, splined, _ in kept]
+        at = AT.rows + ROW.width * sum(len(u) - 1 for u in turns)
+        for piece, ((segment, splined, parts), u) in enumerate(zip(kept, turns, strict=True)):
             ends = np.column_stack([segment.point(u), segment.tangent(u)])
             before = np.zeros(2) if piece == 0 else segments[piece - 1].tangent(np.ones(1))[0]
             after = np.zeros(2) if piece == len(segments) - 1 else segments[piece + 1].tangent(np.zeros(1))[0]
@@ -185,13 +175,13 @@ class Revolved(Levelled, Body):
             ends[0, 2:] = _shared(ends[0, 2:], before)
             ends[-1, 2:] = _shared(ends[-1, 2:], after)
             for k, (start, end) in enumerate(pairwise(ends)):
-                where = at + (sum(map(len, parts[:k])) if kind == SPLINE else 0)
+                where = at + (sum(map(len, parts[:k])) if splined else 0)
                 turned = -math.copysign(1.0, corner) if k == 0 else 1.0
-                rows.append([*start, *end, piece, kind, where, turned])
+                rows.append([*start, *end, piece, splined, where, turned])
             at += sum(map(len, parts))
             shapes += parts
         place = [*self._axes, self._stretch, float(whole), len(rows)]
-        header = np.concatenate([np.full(HEADER, 0.0) if of_map is None else of_map, place])
+        header = np.concatenate([np.zeros(OF_MAP.end) if of_map is None else of_map, place])
         return np.concatenate([header, np.ravel(rows), *shapes])
 
     @cached_property
@@ -218,7 +208,7 @@ class Revolved(Levelled, Body):
         for k in range(last):
             w, r = self._profile[k].end
             turn = _turn(self._profile[k].tangent(np.ones(1))[0], self._profile[k + 1].tangent(np.zeros(1))[0])
-            points = self._ring(w, r, ON_CREASE)
+            points = self._ring(w, r, 360)
             points = np.concatenate([points, points[:1]])
             kind: Literal["edge", "joint", "seam"] = "edge" if abs(turn) > SMALLEST else "joint"
             if kind == "joint" and self._goes_on(k):
@@ -230,7 +220,7 @@ class Revolved(Levelled, Body):
         """Whether piece k + 1 has all of piece k, too."""
         w, r = self._profile[k].point(np.array([0.0, 0.5])).T
         off = self.pieces[k + 1].level(self._placed(np.stack([r, 0 * r, w], axis=-1)))
-        return bool(np.max(np.abs(off)) < SAME * np.max(np.abs(self.bounds)))
+        return bool(np.max(np.abs(off)) < 1e-12 * np.max(np.abs(self.bounds)))
 
     def _angle(self, k: int, points: FloatArray) -> float:
         """Largest angle between the normals of pieces k and k + 1 at points (n, 3)."""
@@ -260,15 +250,15 @@ class Revolved(Levelled, Body):
         """
         positive(edge=edge)
         long, wide = np.ptp(self.bounds, axis=0).sum() / edge, max(np.ptp(self.bounds, axis=0)) / edge
-        if long * wide > MOST_TILES:
-            raise ValueError(
-                f"edge = {edge!r} asks for some {long * wide:.1g} tiles, more than {MOST_TILES:.0g}; give more"
-            )
+        if long * wide > 1e7:
+            raise ValueError(f"edge = {edge!r} asks for some {long * wide:.1g} tiles, more than 1e+07; give more")
+        # steps along and across the profile: the third side is then 1.06 edges at most
+        side = 0.75 * edge
         corners, normals, pieces = [], [], []
         for number, segment in enumerate(self._profile):
-            u = _steps(segment, SIDE * edge)
+            u = _steps(segment, side)
             (w, r), (tw, tr) = segment.point(u).T, segment.tangent(u).T
-            sizes = ring_sizes(r, SIDE * edge, self._stretch)
+            sizes = ring_sizes(r, side, self._stretch)
             for k in range(len(u) - 1):
                 ring, of_ring = strip(int(sizes[k]), int(sizes[k + 1]))
                 angles = [ring_angles(int(n), self._stretch) for n in sizes[k : k + 2]]
@@ -285,13 +275,12 @@ class Revolved(Levelled, Body):
 
     def squares(self, at: FloatArray) -> Squares:
         """Few squares that cover the body, and their points at u and v ``at`` (n,), from 0 to 1."""
-        found = revolved_squares(self._profile, SECTORS if self._stretch == 1.0 else 2 * SECTORS, at)
+        found = revolved_squares(self._profile, 6 if self._stretch == 1.0 else 12, at)
         return found._replace(vertices=self._placed(found.vertices), places=self._placed(found.places))
 
     def _normal(self, local: FloatArray) -> FloatArray:
-        iu, iv, iw = self._axes
-        n = np.empty(local.shape)
-        n[..., iu], n[..., iv], n[..., iw] = local[..., 0], local[..., 1] * self._stretch, local[..., 2]
+        # stretched where points are drawn together
+        n = self._placed(local * np.array([1.0, self._stretch**2, 1.0]))
         return np.asarray(n / np.linalg.norm(n, axis=-1, keepdims=True))
 
     @cached
@@ -301,7 +290,7 @@ class Revolved(Levelled, Body):
         if sharp or self._axes != (0, 1, 2) or self._stretch != 1:
             return no_charts(sharp)
         half, middle = 0.5 * np.ptp(self.bounds, axis=0), self.bounds.mean(axis=0)
-        wider = np.stack([self.bounds[0] - SLACK * half, self.bounds[1] + SLACK * half])
+        wider = np.stack([self.bounds[0] - 0.1 * half, self.bounds[1] + 0.1 * half])
         space = RevolvedSpace(wider, lambda of_map: self._packed(self._profile, of_map))
         sphere_map = RadialMap(space, middle, half, Spine.none())
         points = self.tiles(0.05 * float(np.linalg.norm(half)))[0].reshape(-1, 3)
@@ -327,10 +316,7 @@ def _turn(before: FloatArray, after: FloatArray) -> float:
 
 def _steps(segment: Segment, step: float) -> FloatArray:
     """Values of u at equal steps of the length, of at most ``step``, L."""
-    u = np.linspace(0, 1, DENSE)
-    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(segment.point(u), axis=0), axis=1))])
-    count = max(1, math.ceil(length[-1] / step))
-    return np.interp(np.linspace(0, length[-1], count + 1), length, u)
+    return _evenly(np.linalg.norm(np.diff(segment.point(np.linspace(0, 1, DENSE)), axis=0), axis=1), step)
 
 
 def _towards(phi: FloatArray, sizes: IntArray) -> FloatArray:
@@ -359,7 +345,7 @@ def ring_angles(n: int, stretch: float) -> FloatArray:
 def ring_sizes(radii: FloatArray, edge: float, stretch: float) -> IntArray:
     """Points on rings of these radii (n,), L, for parts of at most ``edge``, L; one where the radius is 0."""
     length = radii * _ring_length(stretch)[1][-1]
-    return np.where(radii > 0, np.maximum(FEWEST, np.ceil(length / edge)), 1).astype(np.int64)
+    return np.where(radii > 0, np.maximum(6, np.ceil(length / edge)), 1).astype(np.int64)
 
 
 def strip(lower: int, upper: int) -> tuple[IntArray, IntArray]:

@@ -15,28 +15,13 @@ from scatterers.exact.switches import ExpressionSpace
 from scatterers.kernels.compiled import SYMMETRIC, Compiled, evaluated
 from scatterers.triangles.topology import components
 
-SINGULAR = 1e-6
-"""|grad F| on the body, relative to its median there, below which a point is singular."""
 SUSPECTS = 200
-HALVINGS = 30
-CLOSE, EDGE = 1e-6, 1e-3
-"""Cells between two points, and the turn of the normal, radians, from one to the other that makes an edge."""
-CLOSER = 60
-"""Steps of the search for kinks, each 0.7 times as wide as the last: it ends 1e-10 cells from where it leads."""
-NEWTON, ROUND = 12, 1e-6
-"""Steps to a tip, and the radius of a sphere about it, in diagonals of the box."""
-ALIKE = 1e-4
-"""Diagonals of the box within which two places are one."""
-AROUND, NEARBY = 4000, (2e-3, 2e-4)
-"""Points of a small sphere about a place, and its radii in diagonals of the box."""
-SHARPEST = 1e8
-"""Curvature, in 1/diagonals of the box, beyond which a place is a kink; a disc of thickness 1e-3 radii has 3e6."""
+AROUND = 4000
+"""Points of a small sphere about a place."""
 SIZES = 2.0 ** np.arange(-8, 13)
 """Half widths of the cubes about the origin in which a body is looked for."""
 COARSE, FINE = 33, 65
 """Nodes along a side of those cubes, and along the longest side of the box that is examined."""
-SLACK = 0.12
-"""By which the box is wider than the body, in its own half widths."""
 
 
 def singular_points(compiled: Compiled, points: FloatArray, size: float) -> FloatArray:
@@ -47,6 +32,8 @@ def singular_points(compiled: Compiled, points: FloatArray, size: float) -> Floa
     ValueError
         If grad F vanishes or is not finite all over F = 0.
     """
+    # |grad F| relative to its median below which a point is singular
+    singular = 1e-6
     points = towards(compiled, points, 4)
     points = points[np.all(np.isfinite(points), axis=1)]
     slope = np.linalg.norm(evaluated(compiled, points)[1], axis=1)
@@ -67,8 +54,8 @@ def singular_points(compiled: Compiled, points: FloatArray, size: float) -> Floa
         at = at + step * np.minimum(1.0, 0.05 * size / np.maximum(length, 1e-300))
     value, gradient, _ = evaluated(compiled, at)
     near = np.linalg.norm(at - start, axis=1) < 0.2 * size
-    flat = np.linalg.norm(gradient, axis=1) < SINGULAR * typical
-    found = at[near & flat & (np.abs(value) < SINGULAR * typical * size)]
+    flat = np.linalg.norm(gradient, axis=1) < singular * typical
+    found = at[near & flat & (np.abs(value) < singular * typical * size)]
     _, first = np.unique((found / (1e-6 * size)).round(), axis=0, return_index=True)
     return np.asarray(found[first])
 
@@ -87,15 +74,15 @@ def refuse_edges(compiled: Compiled, points: FloatArray, spacing: float) -> None
     turn = np.linalg.norm(_normals(compiled, points[a]) - _normals(compiled, points[b]), axis=1)
     most = np.argsort(-np.nan_to_num(turn))[:SUSPECTS]
     a, b = points[a[most]], points[b[most]]
-    for _ in range(HALVINGS):
+    for _ in range(30):
         middle = towards(compiled, 0.5 * (a + b), 6, spacing)
         n = [_normals(compiled, one) for one in (a, middle, b)]
         first = np.linalg.norm(n[1] - n[0], axis=1) >= np.linalg.norm(n[2] - n[1], axis=1)
         a, b = np.where(first[:, None], a, middle), np.where(first[:, None], middle, b)
     left = np.linalg.norm(_normals(compiled, a) - _normals(compiled, b), axis=1)
-    # across a thin part the middle may lead elsewhere, and nothing is learnt
-    left[~(np.linalg.norm(a - b, axis=1) < CLOSE * spacing)] = 0.0
-    if np.any(bad := left > EDGE):
+    # cells apart; across a thin part the middle may lead elsewhere, and nothing is learnt
+    left[~(np.linalg.norm(a - b, axis=1) < 1e-6 * spacing)] = 0.0
+    if np.any(bad := left > 1e-3):
         at = tuple(a[np.argmax(np.nan_to_num(left))].round(6).tolist())
         raise ValueError(
             f"F = 0 is not smooth: its normal jumps by up to {np.degrees(np.nanmax(left)):.2g} degrees near {at} "
@@ -118,7 +105,8 @@ def kinks(compiled: Compiled, points: FloatArray, spacing: float, size: float) -
     most, _ = _bend(compiled, points, np.inf)
     chosen = np.argsort(-most)[:SUSPECTS]
     at, most = points[chosen], most[chosen]
-    for _ in range(CLOSER):
+    # each 0.7 times as wide as the last: it ends 1e-10 cells from where it leads
+    for _ in range(60):
         tried = at[:, None] + reach * rng.normal(size=(len(at), 8, 3))
         bend, tried = _bend(compiled, tried, reach)
         best = np.argmax(bend, axis=1)
@@ -127,7 +115,8 @@ def kinks(compiled: Compiled, points: FloatArray, spacing: float, size: float) -
         at = np.where(up[:, None], tried[rows, best], at)
         most = np.where(up, bend[rows, best], most)
         reach *= 0.7
-    bad = most * size > SHARPEST
+    # a disc of thickness 1e-3 radii has 3e6
+    bad = most * size > 1e8
     return at[bad], most[bad]
 
 
@@ -141,11 +130,11 @@ def refuse_kinks(places: FloatArray, bends: FloatArray) -> None:
 
 
 def distinct(places: FloatArray, bends: FloatArray, size: float) -> FloatArray:
-    """One of the places (m, 3), L, from each group, that with the largest bend (m,)."""
+    """One of the places (m, 3), L, from each group 1e-4 diagonals wide, that with the largest bend (m,)."""
     left, found = np.argsort(-bends), []
     while len(left):
         found.append(places[left[0]])
-        left = left[np.linalg.norm(places[left] - found[-1], axis=1) > ALIKE * size]
+        left = left[np.linalg.norm(places[left] - found[-1], axis=1) > 1e-4 * size]
     return np.array(found).reshape(-1, 3)
 
 
@@ -153,8 +142,9 @@ def polished(compiled: Compiled, place: FloatArray, size: float) -> FloatArray:
     """Tip (3,), L, of a cone near a place: along the mean of grad F about it, its axis, to F = 0."""
     directions = np.random.default_rng(0).normal(size=(AROUND, 3))
     directions = np.concatenate([directions, -directions])
-    directions *= ROUND * size / np.linalg.norm(directions, axis=1, keepdims=True)
-    for _ in range(NEWTON):
+    # radius of a sphere about the tip, in diagonals of the box
+    directions *= 1e-6 * size / np.linalg.norm(directions, axis=1, keepdims=True)
+    for _ in range(12):
         axis = evaluated(compiled, place + directions)[1].mean(axis=0)
         square = float(axis @ axis)
         if not square > 0:
@@ -174,7 +164,7 @@ def is_tip(compiled: Compiled, place: FloatArray, size: float) -> bool:
     sphere = np.stack([ring * np.cos(phi), ring * np.sin(phi), height], axis=-1)
     near = cKDTree(sphere).query(sphere, k=8)[1][:, 1:]
     shares = []
-    for radius in NEARBY:
+    for radius in (2e-3, 2e-4):
         inside = evaluated(compiled, place + radius * size * sphere)[0] < 0
         shares.append(float(np.mean(inside)))
         for part in (inside, ~inside):
@@ -255,7 +245,8 @@ def tightened(space: ExpressionSpace, samples: Samples) -> FloatArray:
     """Box (2, 3), L, around the nodes inside, sampled anew until it fits."""
     for _ in range(4):
         low, high = samples.inside
-        reach = SLACK * 0.5 * (high - low) + 1.5 * samples.spacing
+        # wider than the body by a part of its half widths
+        reach = 0.12 * 0.5 * (high - low) + 1.5 * samples.spacing
         box = np.stack([low - reach, high + reach])
         samples = samples_of(space, box, COARSE)
     return box

@@ -17,8 +17,6 @@ from creeping._typing import FloatArray, IntArray
 from scatterers.expression import NUMERIC, Differentiated, choosing, derivatives, differentiate, parse
 from scatterers.kernels.compiled import Compiled, Kind
 
-MOST_PIECES = 64
-
 
 class Switches:
     """The choices in an expression, and its pieces as they are met.
@@ -86,8 +84,8 @@ class Switches:
             if left not in self.pieces:
                 self.pieces.append(left)
             self._known[made] = self.pieces.index(left)
-            if len(self.pieces) > MOST_PIECES:
-                raise ValueError(f"the body has more than {MOST_PIECES} pieces; give one of fewer")
+            if len(self.pieces) > 64:
+                raise ValueError("the body has more than 64 pieces; give one of fewer")
 
     def _resolved(self, expression: Any, made: dict[Any, int]) -> Any:
         if expression in made:

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
+from scatterers.body import tangents
 from scatterers.charts.samples import towards
 from scatterers.fits.tensor import TensorSpline
 from scatterers.kernels.compiled import SYMMETRIC, evaluated
@@ -258,10 +259,3 @@ def left_at(spline: TensorSpline, points: FloatArray, normals: FloatArray | None
     slope = np.linalg.norm(gradient, axis=1)
     turn = 0.0 if normals is None else np.linalg.norm(gradient / slope[:, None] - normals, axis=1)
     return rms(value / slope), rms(np.asarray(turn))
-
-
-def tangents(normals: FloatArray) -> FloatArray:
-    """Two orthonormal tangents at unit normals: (n, 3) -> (2, n, 3)."""
-    e = np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)])
-    e /= np.linalg.norm(e, axis=1, keepdims=True)
-    return np.stack([e, np.cross(normals, e)])

@@ -22,12 +22,6 @@ if TYPE_CHECKING:
     from scatterers.charts.star import CubeSphereAtlas
 
 
-CHARTS, NO_CHARTS = "charts-", "no_charts"
-SLACK = 0.02
-"""Of the box about a body of pieces, in its largest side."""
-SURFACES = ("smooth", "facets", "auto")
-OF_FACETS = ("part", "cap", "union", "progress")
-"""Options that a body on its facets has as well."""
 Progress = Callable[[str], None]
 Kept = tuple[Path, str, dict[str, FloatArray], dict[str, Any]]
 
@@ -50,7 +44,8 @@ class SplineBody(LevelBody):
         if self.pieces:
             self.__dict__["compiled"] = parts.space.compiled
             corners = parts.corners.reshape(-1, 3)
-            slack = SLACK * np.ptp(corners, axis=0).max()
+            # of the largest side
+            slack = 0.02 * np.ptp(corners, axis=0).max()
             self._bounds = np.stack([corners.min(axis=0) - slack, corners.max(axis=0) + slack])
             return
         (spline,) = parts.space.splines
@@ -125,14 +120,16 @@ class FittedBody(SplineBody):
 
     def __new__(cls, source: Any = None, units: str | None = None, *, surface: str = "smooth", **options: Any) -> Self:
         """The fitted body, or one on its facets: where that is asked for, or with "auto" where no smooth one fits."""
-        if surface not in SURFACES:
-            raise ValueError(f"surface = {surface!r} is none of {', '.join(SURFACES)}")
+        if surface not in ("smooth", "facets", "auto"):
+            raise ValueError(f"surface = {surface!r} is none of smooth, facets, auto")
         if surface == "smooth":
             return super().__new__(cls)
         from scatterers.facets import Facets
 
-        shared = {name: options[name] for name in OF_FACETS if name in options}
-        only = [name for name, value in options.items() if value and name not in (*OF_FACETS, "cache")]
+        # a body on its facets has these as well
+        of_facets = ("part", "cap", "union", "progress")
+        shared = {name: options[name] for name in of_facets if name in options}
+        only = [name for name, value in options.items() if value and name not in (*of_facets, "cache")]
         if surface == "facets":
             if only:
                 raise ValueError(f"{only[0]} is of a smooth surface; leave it out of one on its facets")
@@ -178,9 +175,9 @@ class FittedBody(SplineBody):
         arrays, text = found or _fitted(make(), progress)
         if found is None:
             parts, coarse = self._taken(arrays, text)
-        self._charts = {name[len(CHARTS) :]: array for name, array in arrays.items() if name.startswith(CHARTS)}
+        self._charts = {k.removeprefix("charts-"): array for k, array in arrays.items() if k.startswith("charts-")}
         super().__init__(parts, key, speed)
-        self._no_charts = str(text.get(NO_CHARTS, ""))
+        self._no_charts = str(text.get("no_charts", ""))
         self.coarse_fit = SplineBody(coarse, f"{key}, second", speed)
         self._kept: Kept | None = None
         if folder is not None:
@@ -198,13 +195,13 @@ class FittedBody(SplineBody):
                 self._keep({})
             raise
         if not (self.star_shaped or known):
-            self._keep({CHARTS + name: array for name, array in cast("MongeAtlas", found).arrays().items()})
+            self._keep({"charts-" + name: array for name, array in cast("MongeAtlas", found).arrays().items()})
         return found
 
     def _keep(self, charts: dict[str, FloatArray]) -> None:
         if self._kept is not None:
             folder, key, arrays, text = self._kept
-            _fit_cache.store(folder, key, arrays | charts, text | {NO_CHARTS: self._no_charts})
+            _fit_cache.store(folder, key, arrays | charts, text | {"no_charts": self._no_charts})
 
     @property
     def coarse_factor(self) -> float:

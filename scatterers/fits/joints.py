@@ -32,18 +32,6 @@ from scatterers.triangles.topology import components, cut, edges_of, flat_normal
 
 SMOOTH = 0.02
 """Angle between the normals of two quadrics, radians, up to which they may join there without an edge."""
-SECANTS, FOUND = 6, 1e-6
-"""Steps to the point of a joint on an edge, and what may be left of (n_i - n_j).t, over its change along the edge."""
-SNAP = 0.1
-"""Part of an edge within which a vertex is moved onto a joint, rather than that slivers are cut off."""
-FEWEST = 40
-"""Vertices of a part that is known well enough to be taken for a quadric: a quadric has 9 numbers."""
-FEWEST_NOISY = 100
-"""The same of vertices with noise: no fewer tell it from a surface whose curvature varies a little."""
-MOST = 2000
-"""Vertices that a quadric is fitted to at first."""
-ROUNDS = 12
-"""Times that a quadric is fitted again to all that it holds."""
 
 
 class Sheet:
@@ -76,7 +64,8 @@ def sheets_of(
     n = len(vertices)
     sheets: list[Sheet] = []
     held = np.zeros((n, 0), dtype=bool)
-    close, fewest = Closeness.of(size, noise), FEWEST_NOISY if noise else FEWEST
+    # a quadric has 9 numbers; fewer vertices with noise do not tell it from a surface whose curvature varies a little
+    close, fewest = Closeness.of(size, noise), 100 if noise else 40
     tree = cKDTree(vertices)
     while True:
         left = clean & ~held.any(axis=1)
@@ -86,7 +75,8 @@ def sheets_of(
         # what is farthest from all that is not
         distance = np.full(len(at), size) if left.all() else cKDTree(vertices[~left]).query(vertices[at])[0]
         seed = int(at[np.argmax(distance)])
-        near = np.asarray(tree.query(vertices[seed], np.minimum(len(at), MOST))[1])
+        # 2000 at first
+        near = np.asarray(tree.query(vertices[seed], np.minimum(len(at), 2000))[1])
         near = near[np.linalg.norm(vertices[near] - vertices[seed], axis=1) <= distance.max()]
         if len(near) < fewest:
             break
@@ -109,14 +99,12 @@ def _grown(
     """The plane or quadric through vertices with these numbers, and all that it holds, joined to one of them (n,)."""
     held = np.zeros(len(vertices), dtype=bool)
     sheet = None
-    for _ in range(ROUNDS):
+    for _ in range(12):
         patch = polynomial_patch(vertices[core], normals[core], close)
         if patch is None:
             break
         sheet = Sheet(patch, vertices[core], close)
-        on = np.asarray(sheet.off(vertices) <= sheet.tolerance)
-        parts = _parts(len(vertices), ends, on)
-        mine = on & (parts == parts[seed])
+        mine = _on(sheet, vertices, ends, seed)
         if not mine[seed] or mine.sum() <= held.sum():
             break
         held = mine
@@ -143,10 +131,7 @@ def with_narrow(
         patch = polynomial_patch(vertices[some], normals[some], close)
         if patch is not None:
             sheet = Sheet(patch, vertices[some], close)
-            on = np.asarray(sheet.off(vertices) <= sheet.tolerance)
-            parts = _parts(len(vertices), ends, on)
-            mine = on & (parts == parts[some[0]])
-            sheets, held = [*sheets, sheet], np.column_stack([held, mine])
+            sheets, held = [*sheets, sheet], np.column_stack([held, _on(sheet, vertices, ends, int(some[0]))])
     return sheets, held
 
 
@@ -172,6 +157,13 @@ def with_between(
             mine[used] = True
             more.append(mine)
     return sheets, np.column_stack([held, *more])
+
+
+def _on(sheet: Sheet, vertices: FloatArray, ends: IntArray, seed: int) -> BoolArray:
+    """Vertices (n,) that a sheet holds, joined to one of them."""
+    on = np.asarray(sheet.off(vertices) <= sheet.tolerance)
+    parts = _parts(len(vertices), ends, on)
+    return np.asarray(on & (parts == parts[seed]))
 
 
 def _parts(count: int, ends: IntArray, some: BoolArray) -> IntArray:
@@ -295,6 +287,8 @@ def _across(
 
     The places are in parts of the edge from a, also beyond its ends, with the points (k, 3) there.
     """
+    # what may be left of (n_i - n_j).t, over its change along the edge
+    found_to = 1e-6
     side = other.astype(int) - one.astype(int)
     mine = np.flatnonzero((one | other)[ends].all(axis=1) & (side[ends[:, 0]] != side[ends[:, 1]]))
     pair = ends[mine]
@@ -317,15 +311,15 @@ def _across(
     low, high = np.zeros(len(a)), np.ones(len(a))
     at_low, at_high = turn(start), turn(start + along)
     change = np.maximum(np.abs(at_high - at_low), 1e-300)
-    for _ in range(SECANTS):
+    for _ in range(6):
         # where it is found rounding is no slope
-        more = np.abs(at_high) > 1e-3 * FOUND * change
+        more = np.abs(at_high) > 1e-3 * found_to * change
         slope = np.where(more & (at_high != at_low), at_high - at_low, np.inf)
         low, at_low, high = high, at_high, np.clip(high - at_high * (high - low) / slope, -1.0, 2.0)
         at_high = turn(at(high))
     x = at(high)
     length = np.linalg.norm(along, axis=1)
-    found = np.abs(turn(x)) <= FOUND * change
+    found = np.abs(turn(x)) <= found_to * change
     for sheet in (first, second):
         found &= sheet.off(x) <= 2 * max(first.tolerance, second.tolerance)
     found &= np.abs(np.sum(first.normals(x) * second.normals(x), axis=1) - 1) < SMOOTH**2
@@ -346,7 +340,8 @@ def _take_sides(
     order = np.argsort(np.abs(ahead), kind="stable")
     vertex, nearest = np.unique(vertex[order], return_index=True)
     ahead, x = ahead[order[nearest]], x[order[nearest] % len(where)]
-    on = np.abs(ahead) < SNAP
+    # near in parts of the edge, rather than that slivers are cut off
+    on = np.abs(ahead) < 0.1
     points[vertex[on]] = x[on]
     held[np.ix_(vertex[on], pair)] = True
     both = held[vertex, pair[0]] & held[vertex, pair[1]] & ~on

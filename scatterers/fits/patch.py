@@ -1,9 +1,9 @@
 """F of one smooth region of a body: a plane or quadric where its points lie on one, else a fitted spline.
 
-A quadric Q = 0 has q of unit length that makes sum ON^2 Q(x)^2 + |n x grad Q(x)|^2 least over points x and normals n,
-which tell it from other quadrics through the points. It is taken if all points lie on it within `EXACT` of the body's
+A quadric Q = 0 has q of unit length that makes sum 1e8 Q(x)^2 + |n x grad Q(x)|^2 least over points x and normals n,
+which tell it from other quadrics through the points. It is taken if all points lie on it within 1e-6 of the body's
 size, as those of cylinders, cones and balls of engineering do, or if what is left, e over a length l, changes
-curvatures by 8 e/l^2 < `CLOSE` of the largest, as of cylinders that a program wrote as splines. As polynomials of
+curvatures by 8 e/l^2 < 2e-4 of the largest, as of cylinders that a program wrote as splines. As polynomials of
 degree 2 both kinds are splines of one cell, which go on as they are far beyond the region. Other regions are fitted as
 whole bodies are (`scatterers.fits.solver`), from their own points only, so that nothing is rounded off at their
 borders; a coarser fit tells how far they are known.
@@ -32,27 +32,14 @@ from scatterers.fits.tensor import TensorSpline
 from scatterers.kernels.tensor import POWERS
 from scatterers.triangles.jets import Jets, centroids, signed_distance
 
-EXACT = 1e-6
-"""Distance of points from a plane or quadric, in body sizes, within which they lie on it: single precision and some."""
-OUTLIER, EVENLY = 5.0, 1.4
-"""Largest and rms distance of noisy points from their quadric, in their noise: the rms tells what a quadric misses."""
-CLOSE = 2e-4
-LEAN = 0.35
-"""Angle between the normals of triangles and a quadric through their corners, radians."""
 SLIGHT = 0.1
 """Of the median slope of a quadric: with less, as next to the tip of a cone, it turns much within a triangle, and
 normals need only be on the same side."""
 TIP = 1e-3
 """Of the median slope: with less there is no normal to compare. Also the share of a piece's size by which the sheets of
 a cone may miss their tip."""
-ON = 1e4
-"""Weight of points against normals, which those of triangles give roughly."""
-SPACING, BETWEEN, NODES = 1.8, 1.1, 4e5
-"""Grid of a spline in units of the distance of points, of those with others between them, and its most nodes."""
-STEPS = 300
-"""Of a fit: the borders of a piece take long, and gain little."""
-ROUGHLY = 3e-4
-"""Change of the curvatures at which fits to points of curved triangles stop, which err by more than jets."""
+SPACING = 1.8
+"""Grid of a spline in units of the distance of its points."""
 MOST = 4_000_000
 """Triangles of a mesh that is made."""
 
@@ -88,14 +75,16 @@ def spline_patch(
     With jets at the points and triangles (m, 3) between them, to the points that jets give there as well.
     """
     distance = mean = None
-    accuracy, cells = ROUGHLY, SPACING
+    # change of the curvatures at which a fit stops: curved triangles err by more than jets
+    accuracy, cells = 3e-4, SPACING
     if jets is not None and triangles is not None:
         more, there = centroids(points, triangles, jets)
         distance = partial(signed_distance, points, jets)
-        accuracy, cells = ACCURACY, BETWEEN
+        # with the points between them
+        accuracy, cells = ACCURACY, 1.1
         mean = np.concatenate([np.where(jets.fitted, jets.mean, np.nan), np.full(len(more), np.nan)])
         points, normals = np.concatenate([points, more]), np.concatenate([normals, there])
-    grid = max(cells * spacing, spacing_of(points, NODES))
+    grid = max(cells * spacing, spacing_of(points, 4e5))
     fine, coarse = (
         fit(
             points,
@@ -105,7 +94,8 @@ def spline_patch(
             mean_curvature=mean,
             keep_start=distance is not None,
             accuracy=accuracy,
-            iterations=STEPS,
+            # the borders of a piece take long, and gain little
+            iterations=300,
         )
         for h in (grid, COARSER * grid)
     )
@@ -121,8 +111,9 @@ class Closeness(NamedTuple):
     @classmethod
     def of(cls, size: float, noise: float = 0.0) -> "Closeness":
         """On a body of a size whose points have noise, both L."""
-        exact = cls(EXACT * size)
-        return cls(max(exact.most, OUTLIER * noise), max(exact.most, EVENLY * noise)) if noise else exact
+        # single precision and some; of noisy points the rms tells what a quadric misses
+        exact = cls(1e-6 * size)
+        return cls(max(exact.most, 5.0 * noise), max(exact.most, 1.4 * noise)) if noise else exact
 
 
 def polynomial_patch(points: FloatArray, normals: FloatArray, close: Closeness) -> Patch | None:
@@ -166,9 +157,10 @@ def polynomial_through(
         bend = _bend(q, powers)
         off = second_order(f, steep, bend) * half
         # a quadric may be a pair of sheets, of which the points take one
-        curved = CLOSE * bend / float(np.median(steep)) * half / 8 if kind == "quadric" else 0.0
+        curved = 2e-4 * bend / float(np.median(steep)) * half / 8 if kind == "quadric" else 0.0
         slope = steep / np.median(steep)
-        least = np.select([slope > SLIGHT, slope > TIP], [np.cos(LEAN), 0.0], -1.0)
+        # normals of triangles lean by so many radians from those of a quadric through their corners
+        least = np.select([slope > SLIGHT, slope > TIP], [np.cos(0.35), 0.0], -1.0)
         if np.all(off <= max(tolerance, curved)) and np.all(lean >= least) and np.sum(slope <= TIP) <= 1:
             return _as_spline(q / np.median(steep), powers, middle, half), kind, float(np.sqrt(np.mean(off**2)))
     return None
@@ -180,10 +172,11 @@ def second_order(value: FloatArray, slope: FloatArray, bend: float) -> FloatArra
 
 
 def _least(value: FloatArray, slope: FloatArray, normals: FloatArray) -> FloatArray:
-    """q (p,) of unit length with least sum ON^2 (value.q)^2 + |n x slope.q|^2, normals (n, 3) made unit vectors."""
+    """q (p,) of unit length with least sum 1e8 (value.q)^2 + |n x slope.q|^2, normals (n, 3) made unit vectors."""
     n = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     across = np.cross(slope, n[:, None])
-    rows = np.concatenate([ON * value, *np.moveaxis(across, -1, 0)])
+    # triangles give normals roughly
+    rows = np.concatenate([1e4 * value, *np.moveaxis(across, -1, 0)])
     return np.asarray(np.linalg.svd(rows, full_matrices=False)[2][-1])
 
 

@@ -50,32 +50,8 @@ from scatterers.triangles.quality import BAD
 from scatterers.triangles.regions import Regions
 from scatterers.triangles.topology import components, flat_normals
 
-FOLD = 3.0
-"""Spacings of the grid within which opposite normals make a fold."""
-RINGS = 4
-"""Triangles beyond a seam that are fitted."""
-GOOD = 0.7
-"""Share of the vertices of a piece whose jets are sound, from which on jets are used."""
-EVEN, MOST_POINTS = 400, 6_000
-"""Fewest points of a piece that is known from few vertices, and the most."""
-JUMP = 0.1
-"""Jump of the curvature across a joint, relative to the larger, below which it is none,"""
-NONE = 1e-6
-"""and times the length of the joint, for parts of one plane."""
-AT_TIP = 2.0
-"""Sides of the nearest triangle within which the tip of a cone belongs to a piece: some meshes blunt it."""
-SHARE = 500
-"""Triangles cut at a time."""
 MISSED = 1e-4
 """Distance in body sizes between a point and the level there, beyond which the level is not trusted about it."""
-TURNED, FAR_FROM_USUAL = 0.05, 6.0
-"""Angle between a fit's normal and that of triangles or faces, radians, and over the median, that is not trusted."""
-ROUGH = 0.05
-"""Misfit, in spacings of the points, beyond which nothing of a piece is trusted."""
-FAR_OFF = 0.5
-"""Largest distance of its points from F = 0, in their spacings, that a piece may have."""
-SMALL = 0.02
-"""Triangles of a region that may be absorbed, relative to those of the quadric's."""
 
 
 def astray(space: PieceSpace, patches: list[Patch], points: FloatArray, owner: IntArray, size: float) -> FloatArray:
@@ -96,8 +72,8 @@ def doubtful(patch: Patch, x: FloatArray, normals: FloatArray) -> FloatArray:
         return np.zeros((0, 3))
     gradient = patch.fine.gradient(x)
     turn = np.linalg.norm(gradient / np.linalg.norm(gradient, axis=1, keepdims=True) - normals, axis=1)
-    # coarse triangles err, too
-    return np.asarray(x[~(turn <= max(TURNED, FAR_FROM_USUAL * float(np.median(turn))))])
+    # more than 0.05 radians, or six times what is usual: coarse triangles err, too
+    return np.asarray(x[~(turn <= max(0.05, 6.0 * float(np.median(turn))))])
 
 
 def rough(patch: Patch, points: FloatArray, size: float) -> bool:
@@ -108,9 +84,10 @@ def rough(patch: Patch, points: FloatArray, size: float) -> bool:
         return False
     value, gradient = patch.fine.value_and_gradient(points)
     slope = np.linalg.norm(gradient, axis=1)
-    if patch.misfit > ROUGH * patch.spacing or slope.min() < SLOPES[0] or slope.max() > SLOPES[1]:
+    # misfit and largest distance in spacings of the points
+    if patch.misfit > 0.05 * patch.spacing or slope.min() < SLOPES[0] or slope.max() > SLOPES[1]:
         return True
-    return bool(np.max(np.abs(value) / slope) > FAR_OFF * patch.spacing)
+    return bool(np.max(np.abs(value) / slope) > 0.5 * patch.spacing)
 
 
 def fitted_pieces(cloud: PieceCloud, progress: Callable[[str], None]) -> Fit:
@@ -192,7 +169,8 @@ def _judged(crease: Crease, patches: list[Patch]) -> Crease:
         bends.append(curvatures(spline, x, across)[0][: len(x)])
     jump = float(np.median(np.abs(bends[0] - bends[1])))
     largest = float(np.median(np.max(np.abs(bends), axis=0)))
-    return replace(crease, kind="seam") if jump <= max(JUMP * largest, NONE / crease.length) else crease
+    # less than a tenth of the larger curvature is no jump, nor is what rounding leaves of parts of one plane
+    return replace(crease, kind="seam") if jump <= max(0.1 * largest, 1e-6 / crease.length) else crease
 
 
 def _tips(vertices: FloatArray, triangles: IntArray, piece: IntArray, patches: list[Patch]) -> tuple[Crease, ...]:
@@ -205,18 +183,21 @@ def _tips(vertices: FloatArray, triangles: IntArray, piece: IntArray, patches: l
         corners = vertices[triangles[piece == number]]
         nearest = int(np.argmin(np.min(np.linalg.norm(corners - tip, axis=2), axis=1)))
         sides = np.linalg.norm(np.roll(corners[nearest], -1, axis=0) - corners[nearest], axis=1)
-        if np.min(np.linalg.norm(corners[nearest] - tip, axis=1)) < AT_TIP * sides.max():
+        # some meshes blunt their tips
+        if np.min(np.linalg.norm(corners[nearest] - tip, axis=1)) < 2.0 * sides.max():
             found.append(Crease("tip", (number, number), tip[None]))
     return tuple(found)
 
 
 def _spread(corners: FloatArray, normals: FloatArray, piece: IntArray) -> tuple[FloatArray, IntArray]:
     """Points (k, 3), L, all over the body, closer to each other than a voxel, and their pieces (k,)."""
+    # triangles cut at a time
+    share = 500
     box = np.stack([corners.min(axis=(0, 1)), corners.max(axis=(0, 1))])
     side = voxel_side(box)
     points, owner = [], []
-    for start in range(0, len(corners), SHARE):
-        some = slice(start, start + SHARE)
+    for start in range(0, len(corners), share):
+        some = slice(start, start + share)
         origin, place = divided(corners[some], 0.9 * side)
         x = curved(corners[some][origin], normals[some][origin], place.mean(axis=1))[0]
         # long triangles are cut into more than is needed
@@ -243,7 +224,8 @@ def _parted(cloud: PieceCloud, close: Closeness) -> IntArray:
         own = np.flatnonzero(regions.number == number)
         folds = bool(itself[number])
         if not folds and len(own) > 1:
-            reach = FOLD * SPACING * _spacing(corners[own])
+            # opposite normals within three spacings of the grid
+            reach = 3.0 * SPACING * _spacing(corners[own])
             origin, place = divided(corners[own], max(reach, 0.02 * float(np.sqrt(2 * area[own].sum()))))
             tree = cKDTree(np.einsum("kj,kjc->kc", place.mean(axis=1), corners[own][origin]))
             pairs = own[origin][tree.query_pairs(reach, output_type="ndarray")]
@@ -285,9 +267,9 @@ def _by_axis(own: IntArray, normal: FloatArray, regions: Regions) -> IntArray:
 
 
 def _grown(piece: IntArray, number: int, regions: Regions) -> IntArray:
-    """Triangles of a piece and those of its region that are next to it."""
+    """Triangles of a piece and those of its region in four rings about it."""
     inside = piece == number
-    for _ in range(RINGS):
+    for _ in range(4):
         touching = inside[regions.joined]
         inside[regions.joined[touching.any(axis=1)].ravel()] = True
     return np.flatnonzero(inside)
@@ -321,6 +303,8 @@ def _corner_normals(patch: Patch, corners: FloatArray) -> FloatArray:
 
 def _patch(cloud: PieceCloud, members: IntArray, own: IntArray, close: Closeness) -> tuple[Patch, FloatArray]:
     """F of a piece from its triangles and those next to it, and the normals at the corners of its own."""
+    # points of a piece, enough to be known by, and the most
+    enough, most = 400, 6_000
     local, x, n = _known(cloud, members)
     corners, exact = x[local], cloud.normals is not None
     mine = np.isin(members, own)
@@ -330,12 +314,12 @@ def _patch(cloud: PieceCloud, members: IntArray, own: IntArray, close: Closeness
     side = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     jets = None if exact else _sound_jets(x, local, n)
     even = float(np.percentile(side, 90)) < 4 * float(np.percentile(side, 10))
-    if (jets is not None or exact) and even and len(x) >= EVEN:
+    if (jets is not None or exact) and even and len(x) >= enough:
         n = n if jets is None else jets.normals
         return spline_patch(x, n, float(side.mean()), jets, local), n[local[mine]]
     # known from few vertices: points between them by curved triangles
     area = float(flat_normals(corners)[1].sum())
-    edge = max(min(_spacing(corners), np.sqrt(area / EVEN)), np.sqrt(area / MOST_POINTS))
+    edge = max(min(_spacing(corners), np.sqrt(area / enough)), np.sqrt(area / most))
     origin, place = divided(corners, 1.5 * edge)
     points, between = curved(corners[origin], n[local][origin], place.mean(axis=1))
     # long triangles leave points closer together along their short sides
@@ -354,11 +338,14 @@ def _sound_jets(x: FloatArray, triangles: IntArray, normals: FloatArray) -> Jets
     doubt = edge * np.abs(jets.principal4 - jets.principal).max(axis=1) / 3
     apart = np.linalg.norm(jets.normals - normals, axis=1) > 0.5
     sound = jets.fitted & (np.maximum(jets.tilt, doubt) < BAD) & ~apart
-    return jets if np.mean(sound) >= GOOD else None
+    # of 70 in 100 at least
+    return jets if np.mean(sound) >= 0.7 else None
 
 
 def absorbed(cloud: PieceCloud, close: Closeness) -> PieceCloud:
     """The mesh, its regions without creases that lie within one quadric."""
+    # triangles of a region that may be absorbed, relative to those of the quadric
+    few = 0.02
     regions = cloud.regions
     number, crease = regions.number.copy(), regions.crease.copy()
     sharp = np.flatnonzero(regions.crease & ~regions.level)
@@ -369,7 +356,7 @@ def absorbed(cloud: PieceCloud, close: Closeness) -> PieceCloud:
     for k in np.argsort(-count).tolist():
         pair = number[sides]
         beside = np.unique(pair[(pair == k).any(axis=1)])
-        small = [j for j in beside.tolist() if j != k and count[j] <= SMALL * count[k]]
+        small = [j for j in beside.tolist() if j != k and count[j] <= few * count[k]]
         itself = bool(np.any(np.all(pair == k, axis=1)))
         members = np.flatnonzero(number == k)
         patch = polynomial_patch(*_known(cloud, members)[1:], close) if itself or small else None
@@ -383,7 +370,7 @@ def absorbed(cloud: PieceCloud, close: Closeness) -> PieceCloud:
             number[np.isin(number, good)] = k
             pair = number[sides]
             beside = np.unique(pair[(pair == k).any(axis=1)])
-            small = [j for j in beside.tolist() if j != k and count[j] <= SMALL * count[k]] if good else []
+            small = [j for j in beside.tolist() if j != k and count[j] <= few * count[k]] if good else []
         crease[sharp[np.all(number[sides] == k, axis=1)]] = False
     if np.array_equal(crease, regions.crease):
         return cloud

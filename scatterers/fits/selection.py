@@ -23,25 +23,13 @@ from typing import Any
 import numpy as np
 
 from creeping._typing import FloatArray, IntArray
-from scatterers.body import Crease
+from scatterers.body import Crease, normals_of
 from scatterers.fits.tensor import TensorSpline, side_of_cells
 from scatterers.kernels.compiled import Compiled, evaluated
-from scatterers.kernels.tensor import BESIDES, CENTRE, HEADER, LARGER, MOST_PIECES, SMALLER, TABLES
+from scatterers.kernels.tensor import AT, MOST_PIECES, TABLES, Token
 
-VOXELS = 500_000
-"""Voxels about a body."""
-SAME = 0.03
-"""|F| in voxels at points of another piece, in the mean, below which both are parts of one smooth surface."""
-LONGEST = 6
-"""Smooth neighbours in a voxel that are told apart."""
 MARGIN = 3
 """Voxels about the body."""
-ALIKE = 0.5
-"""Cosine between the normals of pieces that a chain of joints makes one surface: across a sharp nose they oppose."""
-STRAIGHT, KINK = 1e-3, 0.8
-"""Turn of a joint over three of its segments, radians, from which on it has a plane, and beyond which it is a kink;"""
-STEEP = 0.5
-"""cosine between that plane and the one at right angles to the body, below which it nearly touches the body."""
 
 
 Program = tuple[float, ...]
@@ -73,7 +61,7 @@ class PieceSpace:
     @cached_property
     def parameters(self) -> FloatArray:
         """Parameters of the compiled level."""
-        flat = [spline.flat(np.zeros(HEADER - CENTRE)) for spline in self.splines]
+        flat = [spline.flat(np.zeros(AT.end - AT.centre)) for spline in self.splines]
         table = self.table.copy()
         table[8] = len(table)
         places = len(table) + len(flat) + np.cumsum([0, *(len(part) for part in flat[:-1])])
@@ -118,10 +106,10 @@ def _sound(program: FloatArray, count: int) -> bool:
     height, k = 0, 0
     while k < len(program):
         token = program[k]
-        if token != round(token) or not BESIDES <= token < count:
+        if token != round(token) or not Token.BESIDES <= token < count:
             return False
         height += 1 if token >= 0 else -1
-        k += 5 if token == BESIDES else 1
+        k += 5 if token == Token.BESIDES else 1
         if not 1 <= height <= MOST_PIECES:
             return False
     return height == 1 and k == len(program)
@@ -129,7 +117,7 @@ def _sound(program: FloatArray, count: int) -> bool:
 
 def voxel_side(box: FloatArray) -> float:
     """Side of the voxels about a body in its box (2, 3), L."""
-    return side_of_cells(box[1] - box[0], 2 * MARGIN, VOXELS)
+    return side_of_cells(box[1] - box[0], 2 * MARGIN, 500_000)
 
 
 def piece_space(
@@ -150,7 +138,8 @@ def piece_space(
     middles = origin + side * (np.stack(np.unravel_index(occupied, shape), axis=1) + 0.5)
     nearest = owner[cKDTree(points).query(middles)[1]]
     pairs = _pairs(row.ravel(), piece, at)
-    signs = _signs(splines, points, pairs, SAME * side)
+    # |F| in voxels, in the mean, below which two are parts of one smooth surface
+    signs = _signs(splines, points, pairs, 0.03 * side)
     programs: list[Program] = [(int(number),) for number in nearest]
     known: dict[tuple[Any, ...], Program] = {}
     planes = JointPlanes(splines, creases, points, owner)
@@ -239,7 +228,7 @@ def _program(
     among: tuple[tuple[tuple[int, int], int], ...],
     beside: tuple[tuple[tuple[int, int], tuple[float, ...]], ...],
 ) -> Program:
-    """F of the body from those of pieces in postfix order: numbers of pieces, `LARGER`, `SMALLER`, `BESIDES`."""
+    """F of the body from those of pieces in postfix order: numbers of pieces, and tokens."""
     signs, planes = dict(among), dict(beside)
     pieces = sorted({number for pair in signs for number in pair}, key=lambda number: (number != nearest, number))
     # of one smooth surface the first stands for all, but beyond the planes that part them
@@ -260,7 +249,7 @@ def _program(
     def joined(members: list[int]) -> Program:
         if len(members) == 1:
             return leaves[members[0]]
-        for sign, last in ((-1, LARGER), (1, SMALLER)):
+        for sign, last in ((-1, Token.LARGER), (1, Token.SMALLER)):
             # groups that hang together by the other sign come first
             groups: list[set[int]] = []
             for number in members:
@@ -276,7 +265,7 @@ def _program(
         program = leaves[members[0]]
         for number in members[1:]:
             sign = signs[min(members[0], number), max(members[0], number)]
-            program = (*program, *leaves[number], LARGER if sign > 0 else SMALLER)
+            program = (*program, *leaves[number], Token.LARGER if sign > 0 else Token.SMALLER)
         return program
 
     return joined(kept)
@@ -288,14 +277,14 @@ def _chain(
     """A piece and its smooth neighbours, each beyond the plane through its joint with the one before; they are noted.
 
     Where four meet in a point, the last is beyond one plane of its neighbour, within what is beyond another: chains are
-    nested, the longest outermost.
+    nested, the longest outermost. Six neighbours are told apart at most.
     """
     before: dict[int, list[int]] = {number: []}
     ends = [number]
     while ends:
         k = ends.pop(0)
         for other in others:
-            if (min(k, other), max(k, other)) in planes and other not in before and len(chained) < LONGEST:
+            if (min(k, other), max(k, other)) in planes and other not in before and len(chained) < 6:
                 before[k].append(other)
                 before[other] = []
                 chained.add(other)
@@ -307,7 +296,7 @@ def _chain(
         for part, other in parts:
             turn = 1.0 if k < other else -1.0
             plane = planes[min(k, other), max(k, other)]
-            program = (*program, *part, BESIDES, *(turn * value for value in plane))
+            program = (*program, *part, Token.BESIDES, *(turn * value for value in plane))
         return program
 
     return nested(number)
@@ -353,19 +342,10 @@ def of_one_surface(
     if not chained:
         return found
     at, first, second = np.array(chained).T
-    alike = np.sum(_normals(splines, points[at], first) * _normals(splines, points[at], second), axis=1) > ALIKE
+    # across a sharp nose they oppose each other
+    alike = np.sum(normals_of(splines, points[at], first) * normals_of(splines, points[at], second), axis=1) > 0.5
     for where, i, j in np.array(chained)[alike].tolist():
         found[where][i, j] = 0
-    return found
-
-
-def _normals(splines: Sequence[TensorSpline], points: FloatArray, piece: IntArray) -> FloatArray:
-    """Unit normals (n, 3) of the pieces (n,) at points (n, 3)."""
-    found = np.empty_like(points)
-    for number in np.unique(piece):
-        mine = piece == number
-        gradient = evaluated(splines[number].compiled, points[mine])[1]
-        found[mine] = gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
     return found
 
 
@@ -390,7 +370,8 @@ def _osculating(curve: Crease, across: FloatArray) -> FloatArray:
     normal = np.cross(_unit(along), bend)
     turn = np.linalg.norm(normal, axis=1)
     normal = _unit(normal) * np.copysign(1.0, np.sum(normal * across, axis=1))[:, None]
-    sound = (turn > STRAIGHT) & (turn < KINK) & (np.sum(normal * across, axis=1) > STEEP)
+    # not straight, radians over three segments, no kink, and by its cosine not nearly touching the body
+    sound = (turn > 1e-3) & (turn < 0.8) & (np.sum(normal * across, axis=1) > 0.5)
     return np.where(sound[:, None], normal, across)
 
 

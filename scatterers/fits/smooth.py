@@ -13,6 +13,7 @@ from functools import partial
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray
+from scatterers.body import tangents
 from scatterers.charts.samples import Samples
 from scatterers.fits.cloud import (
     FitReport,
@@ -24,27 +25,10 @@ from scatterers.fits.cloud import (
     normal_curvatures,
     principal_curvatures,
     rms,
-    tangents,
 )
 from scatterers.fits.solver import COARSER, MAX_NODES, SLOPES, SMOOTHING, Fitted, fit, spacing_of
 from scatterers.fits.spline_pieces import Fit, SplinePieces
 from scatterers.triangles.subdivision import BLIND, Source, turns, unseen
-
-FEWEST = 0.1
-"""Share of the points that has to be away from places where the body is not smooth, for a fit to mean anything."""
-FINER = 0.75
-"""Spacing of the second fit, in units of the first, to points nearer to the source."""
-SMOOTHINGS = (1e-6, 1e-5, 1e-4, 1e-3)
-"""Tried in turn on noisy points, until the misfit exceeds the noise,"""
-EXCESS = 1.01
-"""by this factor."""
-NORMAL_WEIGHT = 0.1
-"""Of the normals of noisy points: from jets they are noisier than the points."""
-SECOND = 0.4
-"""Share of noisy points that the second fit sees."""
-MOST_BLIND = 0.05
-"""Share of the vertices of a mesh that is subdivided about which it may show nothing."""
-
 
 Progress = Callable[[str], None]
 
@@ -61,7 +45,8 @@ def good_fit(cloud: PointCloud, progress: Progress) -> Fit:
     ValueError
         If there is none, or curvatures are too uncertain: on a narrower grid both fits would follow the same noise.
     """
-    if len(cloud.non_smooth) and np.mean(cloud.smooth) < FEWEST:
+    # else too few of the points are known for a fit to mean anything
+    if len(cloud.non_smooth) and np.mean(cloud.smooth) < 0.1:
         raise ValueError(
             f"{np.sum(~cloud.smooth)} of {len(cloud.points)} points lie within {cloud.reach:.3g} m of places where the "
             "body is not smooth, and nothing is known there; refine the mesh"
@@ -78,7 +63,7 @@ def good_fit(cloud: PointCloud, progress: Progress) -> Fit:
 def _checked_fit(cloud: PointCloud, progress: Progress) -> Fit:
     fine, coarse, smoothing = fits(cloud, progress)
     turn, blind = (np.zeros(0), np.zeros(0, bool)) if cloud.nearer is None else _blind(cloud.nearer.source, fine)
-    seen = not len(turn) or np.mean(blind) <= MOST_BLIND
+    seen = not len(turn) or np.mean(blind) <= 0.05
     # of a mesh that shows too little the fit is to be a body all the same, or a narrower grid is tried
     non_smooth = cloud.non_smooth if cloud.nearer is None or not seen else cloud.nearer.source.vertices[blind]
     report, doubt = compared(replace(cloud, non_smooth=non_smooth), fine, coarse, smoothing)
@@ -114,6 +99,10 @@ def _blind(source: Source, fine: Fitted) -> tuple[FloatArray, BoolArray]:
 
 def fits(cloud: PointCloud, progress: Progress) -> tuple[Fitted, Fitted, float]:
     """The fit, one on another grid, and the smoothing: the least that leaves the points off by their noise."""
+    # weight of the normals of noisy points: from jets they are noisier than these
+    light = 0.1
+    # tried in turn on noisy points, until the misfit exceeds the noise
+    smoothings, most = (1e-6, 1e-5, 1e-4, 1e-3), 1.01 * cloud.noise
     # jets of a mesh that is judged by its fit are no good start, and its samples leave much free
     doubtful = bool(np.isfinite(cloud.uncertain))
     noisy = bool(cloud.noise)
@@ -138,26 +127,27 @@ def fits(cloud: PointCloud, progress: Progress) -> tuple[Fitted, Fitted, float]:
             progress=progress,
         )
 
-    plain = NORMAL_WEIGHT if noisy else 1.0
-    weight = plain if cloud.nearer is None else NORMAL_WEIGHT
-    smoothing = cloud.smoothing or (SMOOTHINGS[0] if noisy or doubtful else SMOOTHING)
+    plain = light if noisy else 1.0
+    weight = plain if cloud.nearer is None else light
+    smoothing = cloud.smoothing or (smoothings[0] if noisy or doubtful else SMOOTHING)
     fine = fitted(cloud, cloud.spacing, smoothing, weight)
-    for more in SMOOTHINGS[1:] if noisy else ():
+    for more in smoothings[1:] if noisy else ():
         # what is smoother is off by more
-        if fine.misfit > EXCESS * cloud.noise:
+        if fine.misfit > most:
             break
         smoother = fitted(cloud, cloud.spacing, more, weight)
-        if smoother.misfit > EXCESS * cloud.noise:
+        if smoother.misfit > most:
             break
         fine, smoothing = smoother, more
     _require_one_body(fine, cloud)
     if cloud.nearer is None:
-        # fits to the same noise err alike
-        fewer = np.random.default_rng(0).random(len(cloud.points)) < SECOND if noisy else slice(None)
+        # to fewer points: fits to the same noise err alike
+        fewer = np.random.default_rng(0).random(len(cloud.points)) < 0.4 if noisy else slice(None)
         other = fitted(cloud, COARSER * cloud.spacing, smoothing, plain, fewer)
     else:
+        # on a finer grid
         finest = spacing_of(cloud.nearer.points, MAX_NODES)
-        other = fitted(cloud.nearer, max(FINER * cloud.spacing, finest), smoothing, plain)
+        other = fitted(cloud.nearer, max(0.75 * cloud.spacing, finest), smoothing, plain)
         if not _one_body(_samples(other)):
             # between points that are too far apart for it
             other = fitted(cloud.nearer, COARSER * cloud.spacing, smoothing, plain)

@@ -25,27 +25,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
-from scatterers.fits.cloud import left_at, tangents
+from scatterers.body import tangents
+from scatterers.fits.cloud import left_at
 from scatterers.fits.tensor import TensorSpline, cardinal, side_of_cells
 from scatterers.kernels.compiled import SYMMETRIC, evaluated
 from scatterers.kernels.tensor import OVERREAD
 
 OFFSET_WEIGHT = 0.01
 """Of the samples at one cell's distance from the body."""
-THIN = 0.2
-"""Cells by which the distance of such a sample may differ from one before the body counts as thin there."""
-OFFSET_STRIDE = 3
-"""Every so many points have such samples."""
 SMOOTHING = 1e-8
-FLOOR = 0.03
-"""Of the density, in units of the largest: what the equations leave nearly free must not dominate the steps."""
 PADDING = 5.0
 """Cells between the body and the faces of the grid."""
 NEAR = 7.0
 """Cells from the points within which a given distance is asked for: beyond, no sample sees what is there."""
-AWAY = 1.2
-"""Cells from the points within which parts of either sign come that the body bounds."""
-QUASI = np.array([13, -112, 438, -112, 13]) / 240
 ROUGHNESS = np.convolve([1, -4, 6, -4, 1], [1, -4, 6, -4, 1])
 """D^T D away from the ends of an axis, D the fourth differences."""
 COARSER = 1.35
@@ -53,18 +45,8 @@ COARSER = 1.35
 SLOPES = (0.5, 1.6)
 """|grad F| on the body: F is near a signed distance, or the fit has failed."""
 MAX_NODES = 8_000_000
-ITERATIONS = 480
-CHECKED = 20
-"""Iterations from one look at the curvature to the next."""
 ACCURACY = 2e-5
 """Change of the curvatures from one look to the next, relative to their rms, at which a fit is done."""
-STALLED = 0.7
-"""Change of the curvatures, in units of that two looks before, from which on a fit that keeps its start is done, too:
-surfaces that are less smooth than their grid go on changing a little."""
-LOST = 2.5
-"""How much worse than the best the curvatures of the F that is taken may be: points and normals gain by every step."""
-WATCHED = 2000
-"""Points at which it is looked at."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +59,7 @@ class Fitted:
     spacing : float
         Of the grid, L.
     change : float
-        Rms change of the principal curvatures over the last `CHECKED` iterations, 1/L.
+        Rms change of the principal curvatures over the last 20 iterations, 1/L.
     misfit : float
         Rms of F/|grad F| at the points, L.
     turn : float
@@ -103,7 +85,7 @@ def fit(
     normal_weight: float = 1.0,
     keep_start: bool = False,
     accuracy: float = ACCURACY,
-    iterations: int = ITERATIONS,
+    iterations: int = 480,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Fitted:
     """Fit F to points (n, 3) of a closed body, L, and outward unit normals (n, 3) there.
@@ -126,7 +108,7 @@ def fit(
     keep_start : bool
         Smooth the change from the distance that is given, not F: for points without noise.
     accuracy : float
-        Change of the curvatures over `CHECKED` iterations, relative to their rms, at which the solver stops.
+        Change of the curvatures over 20 iterations, relative to their rms, at which the solver stops.
     iterations : int
         Most steps of the solver.
     progress : callable
@@ -137,6 +119,8 @@ def fit(
     ValueError
         If the grid would have more than `MAX_NODES` nodes.
     """
+    # iterations from one look at the curvature to the next
+    checked = 20
     equations = _Equations(points, normals, spacing, smoothing, normal_weight, trusted)
     c = equations.start(distance)
     watch = _Watch(equations, mean_curvature)
@@ -158,7 +142,7 @@ def fit(
         p *= rz / last
         p += z
         done += 1
-        if done % CHECKED:
+        if done % checked:
             continue
         now = watch.curvatures(c)
         change = float(np.sqrt(np.mean((now - before) ** 2)))
@@ -166,11 +150,13 @@ def fit(
         progress(f"fitting: {done} iterations, curvatures changing by {change / scale:.1e}")
         before, off = now, watch.off(now)
         best = min(best, off)
-        if off <= LOST * best:
+        # points and normals gain by every step, and some steps cost curvature
+        if off <= 2.5 * best:
             kept = c.copy()
-        elif done > CHECKED:
+        elif done > checked:
             break
-        if change <= accuracy * scale or (keep_start and change > STALLED * changes[-2]):
+        # over two looks: surfaces that are less smooth than their grid go on changing a little
+        if change <= accuracy * scale or (keep_start and change > 0.7 * changes[-2]):
             break
         changes.append(change)
     return equations.result(kept if watch.guided else c, change / spacing)
@@ -217,13 +203,14 @@ class _Equations:
         places = (points - low) / spacing
         order = np.lexsort(places.astype(np.int64).T[::-1])
         places, self.sorted_normals = places[order], np.ascontiguousarray(normals[order])
-        some = slice(None, None, OFFSET_STRIDE)
+        some = slice(None, None, 3)
         self.samples = [places, *(np.ascontiguousarray((places + k * self.sorted_normals)[some]) for k in (1, -1))]
         self.nothing, self.flat = np.zeros(len(places)), np.zeros_like(places)
         self.targets = [self.nothing, *(self._offset_targets(k) for k in (1, -1))]
         self.unknown = self._seen()
         density = self._density()
-        self.damping = 1 / (density + FLOOR * density.max() + 3 * ROUGHNESS.max() * smoothing)
+        # a floor: what the equations leave nearly free must not dominate the steps
+        self.damping = 1 / (density + 0.03 * density.max() + 3 * ROUGHNESS.max() * smoothing)
 
     def _nearest(self, where: FloatArray) -> IntArray:
         """Points nearest to all nodes (m, 3), but for some spacings where they are many spacings off.
@@ -252,16 +239,18 @@ class _Equations:
     def _offset_targets(self, k: int) -> FloatArray:
         """f at the samples a cell outside (k = 1) or inside (k = -1) the body: k, or less where it is thin."""
         distance = self._plane_distance(self.low + self.spacing * self.samples[k])[0] / self.spacing
-        return np.where(np.abs(distance - k) < THIN, float(k), distance)
+        # where it differs by more from a cell the body is thin
+        return np.where(np.abs(distance - k) < 0.2, float(k), distance)
 
     def start(self, distance: Callable[[FloatArray], FloatArray] | None) -> FloatArray:
         """Coefficients of the distance near the body, where it is given, and else of that to the nearest tangent plane.
 
         Far from a plane's point, of the distance to that point. Coefficients follow from values at the nodes by the
-        quasi-interpolant QUASI, which reproduces quintics and reaches two nodes only: kinks far off stay there.
+        quasi-interpolant below, which reproduces quintics and reaches two nodes only: kinks far off stay there.
         """
         from scipy.ndimage import convolve1d
 
+        quasi = np.array([13, -112, 438, -112, 13]) / 240
         axes = [self.low[k] + self.spacing * (np.arange(self.shape[k]) - 2.0) for k in range(3)]
         where = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         values, off = self._plane_distance(where, self._nearest(where))
@@ -274,7 +263,7 @@ class _Equations:
         values[self._stray(values, off)] *= -1
         c = values.reshape(self.shape) / self.spacing
         for axis in range(3):
-            c = convolve1d(c, QUASI, axis=axis, mode="nearest")
+            c = convolve1d(c, quasi, axis=axis, mode="nearest")
         return np.concatenate([c.ravel(), np.zeros(OVERREAD)])
 
     def _stray(self, values: FloatArray, off: FloatArray) -> BoolArray:
@@ -284,7 +273,8 @@ class _Equations:
         """
         from scipy.ndimage import label
 
-        near, stray = off <= AWAY * self.spacing, np.zeros(len(off), dtype=bool)
+        # in cells; so near come parts of either sign that the body bounds
+        near, stray = off <= 1.2 * self.spacing, np.zeros(len(off), dtype=bool)
         for side in (values < 0, values >= 0):
             part, count = label(side.reshape(self.shape))
             part = part.ravel()
@@ -369,7 +359,7 @@ class _Watch:
         self.guided = mean_curvature is not None
         guide = np.zeros(len(at)) if mean_curvature is None else mean_curvature[equations.fitted]
         known = np.flatnonzero(np.isfinite(guide))
-        known = known[:: max(1, len(known) // WATCHED)]
+        known = known[:: max(1, len(known) // 2000)]
         self.at, n, self.guide = at[known], n[known], guide[known] * equations.spacing
         self.tangents = tangents(n)
 

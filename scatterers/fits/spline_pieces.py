@@ -20,10 +20,6 @@ from scatterers.fits.tensor import TensorSpline
 from scatterers.kernels.compiled import evaluated
 
 KINDS = ("edge", "joint", "tip", "seam")
-LEAST = 6
-"""Coefficients along an axis of a spline of degree 5."""
-STEPS, MOVED = 3, 0.1
-"""Newton steps that bring tiles onto their piece, and the longest, in their sides."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +76,7 @@ class SplinePieces:
         number = self.number[origin]
         for piece in np.unique(number):
             mine = number == piece
-            x = towards(self.space.splines[piece].compiled, points[mine], STEPS, MOVED * edge)
+            x = towards(self.space.splines[piece].compiled, points[mine], 3, 0.1 * edge)
             gradient = evaluated(self.space.splines[piece].compiled, x)[1]
             points[mine], normals[mine] = x, gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)
         return points, normals, number
@@ -181,7 +177,8 @@ def unpacked(arrays: Mapping[str, FloatArray], name: str) -> tuple[TensorSpline,
     splines = []
     for k in range(len(arrays["reach"])):
         grid, coefficients = arrays[f"{name}-grid-{k}"], arrays[f"{name}-coefficients-{k}"]
-        sound = grid.shape == (2, 3) and coefficients.ndim == 3 and min(coefficients.shape) >= LEAST
+        # of degree 5
+        sound = grid.shape == (2, 3) and coefficients.ndim == 3 and min(coefficients.shape) >= 6
         sound = sound and grid.dtype == coefficients.dtype == float and bool(np.all(np.isfinite(grid)))
         if not sound or np.any(grid[1] <= 0) or not np.all(np.isfinite(coefficients)):
             raise ValueError(f"spline {k} of the {name} fit is damaged")

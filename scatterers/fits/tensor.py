@@ -20,7 +20,7 @@ import numpy as np
 from creeping._typing import FloatArray
 from scatterers.body import Levelled
 from scatterers.kernels.compiled import Compiled, evaluated
-from scatterers.kernels.tensor import CENTRE, HEADER, OVERREAD
+from scatterers.kernels.tensor import AT, OVERREAD
 
 NODAL = np.array([1, 26, 66, 26, 1]) / 120
 """A B-spline at the nodes."""
@@ -127,4 +127,4 @@ class TensorSpline(Levelled):
     @cached_property
     def compiled(self) -> Compiled:
         """Compiled evaluator."""
-        return Compiled(self.sources["level"], "level", self.flat(np.zeros(HEADER - CENTRE)))
+        return Compiled(self.sources["level"], "level", self.flat(np.zeros(AT.end - AT.centre)))

@@ -29,7 +29,7 @@ n.N < ``least``, or rho > ``longest``, or rho max|kappa| > ``most`` with the lar
 Also here: where values stand in the flat parameters of an atlas of Monge charts, which its compiled locator shares.
 
 Origin of the voxels, 1/side, their numbers along the axes, where the table of voxels begins, the least n.N and the
-largest |2u - 1|; then `CHART` values a chart: x0, E1, E2, N, 1/w, bounds of the height. The table gives for each voxel
+largest |2u - 1|; then 15 values a chart: x0, E1, E2, N, 1/w, bounds of the height. The table gives for each voxel
 the place of its list of charts, which begins with its length.
 
 Sources: Derivations, B1 to B4.
@@ -39,28 +39,14 @@ import heapq
 import math
 from collections.abc import Callable
 from types import FunctionType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
 from creeping._typing import FloatArray
 from scatterers.kernels.compiled import OPTIONS, helper
-from scatterers.kernels.tensor import (
-    AXIS,
-    BOX,
-    CENTRE,
-    DEGREE,
-    HALF_AXES,
-    ITERATIONS,
-    MIDDLE,
-    PER_HALF,
-    REACH,
-    SHIFTS,
-    SMALL,
-    value_and_gradient,
-    voxel_place,
-)
+from scatterers.kernels.tensor import AT, DEGREE, REACH, value_and_gradient, voxel_place
 
 _COS: tuple[float, ...] = tuple((-1) ** j * math.pi ** (2 * j) / math.factorial(2 * j) for j in range(12))
 _SIN: tuple[float, ...] = tuple((-1) ** j * math.pi ** (2 * j + 1) / math.factorial(2 * j + 1) for j in range(11))
@@ -141,9 +127,9 @@ def _exit(y, parameters):  # type: ignore[no-untyped-def]
     largest = math.inf
     for axis in range(3):
         if y[axis] > 0.0:
-            largest = min(largest, parameters[BOX + 3 + axis] / y[axis])
+            largest = min(largest, parameters[AT.box + 3 + axis] / y[axis])
         elif y[axis] < 0.0:
-            largest = min(largest, parameters[BOX + axis] / y[axis])
+            largest = min(largest, parameters[AT.box + axis] / y[axis])
     return largest
 
 
@@ -170,22 +156,22 @@ def _polynomial(t, start, parameters):  # type: ignore[no-untyped-def]
 @njit(**OPTIONS)
 def _spine(w, parameters):  # type: ignore[no-untyped-def]
     """Shift T(w) - w and its derivative along the spine's axis, which an x in the place of w has too."""
-    per_half = parameters[PER_HALF]
+    per_half = parameters[AT.per_half]
     if per_half == 0.0:
         return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    t = (w[int(parameters[AXIS])] - parameters[MIDDLE]) * per_half
+    t = (w[int(parameters[AT.axis])] - parameters[AT.middle]) * per_half
     if abs(t) > REACH:
         t, per_half = math.copysign(REACH, t), 0.0
-    x, dx = _polynomial(t, SHIFTS, parameters)
-    y, dy = _polynomial(t, SHIFTS + DEGREE + 1, parameters)
-    z, dz = _polynomial(t, SHIFTS + 2 * DEGREE + 2, parameters)
+    x, dx = _polynomial(t, AT.shifts, parameters)
+    y, dy = _polynomial(t, AT.shifts + DEGREE + 1, parameters)
+    z, dz = _polynomial(t, AT.shifts + 2 * DEGREE + 2, parameters)
     return (x, y, z), (per_half * dx, per_half * dy, per_half * dz)
 
 
 @njit(**OPTIONS)
 def _pulled(g, slope, parameters):  # type: ignore[no-untyped-def]
     """DT^T g."""
-    axis, along = int(parameters[AXIS]), slope[0] * g[0] + slope[1] * g[1] + slope[2] * g[2]
+    axis, along = int(parameters[AT.axis]), slope[0] * g[0] + slope[1] * g[1] + slope[2] * g[2]
     x = g[0] + along if axis == 0 else g[0]
     y = g[1] + along if axis == 1 else g[1]
     return x, y, g[2] + along if axis == 2 else g[2]
@@ -194,14 +180,14 @@ def _pulled(g, slope, parameters):  # type: ignore[no-untyped-def]
 @njit(**OPTIONS)
 def _pushed(v, slope, parameters):  # type: ignore[no-untyped-def]
     """DT v."""
-    along = v[int(parameters[AXIS])]
+    along = v[int(parameters[AT.axis])]
     return v[0] + slope[0] * along, v[1] + slope[1] * along, v[2] + slope[2] * along
 
 
 @njit(**OPTIONS)
 def _at(r, y, parameters):  # type: ignore[no-untyped-def]
     """x = T(c + r y), the slope of the spine there, F and DT^T grad F."""
-    w = (parameters[CENTRE] + r * y[0], parameters[CENTRE + 1] + r * y[1], parameters[CENTRE + 2] + r * y[2])
+    w = (parameters[AT.centre] + r * y[0], parameters[AT.centre + 1] + r * y[1], parameters[AT.centre + 2] + r * y[2])
     shift, slope = _spine(w, parameters)
     x = (w[0] + shift[0], w[1] + shift[1], w[2] + shift[2])
     value, gx, gy, gz = value_and_gradient(x[0], x[1], x[2], parameters)
@@ -213,7 +199,7 @@ def _radius(y, parameters):  # type: ignore[no-untyped-def]
     """Root r of F(T(c + r y)), NaN if none is found."""
     low, high = 0.0, _exit(y, parameters)
     r = 1.0 if high > 1.0 else 0.5 * high
-    for _ in range(ITERATIONS):
+    for _ in range(60):
         x, _, value, g = _at(r, y, parameters)
         if _beyond(x, parameters):
             value = math.inf
@@ -222,7 +208,8 @@ def _radius(y, parameters):  # type: ignore[no-untyped-def]
         else:
             low = max(low, r)
         step = -value / (g[0] * y[0] + g[1] * y[1] + g[2] * y[2])
-        if abs(step) <= SMALL * r:
+        # the error of so small a Newton step is below rounding
+        if abs(step) <= 1e-8 * r:
             return r + step
         inside = r + step > low and r + step < high
         r = r + step if inside else 0.5 * (low + high)
@@ -231,7 +218,7 @@ def _radius(y, parameters):  # type: ignore[no-untyped-def]
 
 def forward(s, points, derivatives, parameters):  # type: ignore[no-untyped-def]
     """Points and derivatives of psi for a block."""
-    a, b, c = parameters[HALF_AXES], parameters[HALF_AXES + 1], parameters[HALF_AXES + 2]
+    a, b, c = parameters[AT.half_axes], parameters[AT.half_axes + 1], parameters[AT.half_axes + 2]
     for i in range(s.shape[1]):
         y = (a * s[0, i], b * s[1, i], c * s[2, i])
         r = _radius(y, parameters)
@@ -267,13 +254,13 @@ def one_cell(box: FloatArray, of_map: FloatArray) -> FloatArray:
 
 def inverse(points, s, parameters):  # type: ignore[no-untyped-def]
     """psi^-1 of a block."""
-    a, b, c = parameters[HALF_AXES], parameters[HALF_AXES + 1], parameters[HALF_AXES + 2]
+    a, b, c = parameters[AT.half_axes], parameters[AT.half_axes + 1], parameters[AT.half_axes + 2]
     for i in range(points.shape[1]):
         x, y, z = points[0, i], points[1, i], points[2, i]
         shift, _ = _spine((x, y, z), parameters)
-        x = (x - shift[0] - parameters[CENTRE]) / a
-        y = (y - shift[1] - parameters[CENTRE + 1]) / b
-        z = (z - shift[2] - parameters[CENTRE + 2]) / c
+        x = (x - shift[0] - parameters[AT.centre]) / a
+        y = (y - shift[1] - parameters[AT.centre + 1]) / b
+        z = (z - shift[2] - parameters[AT.centre + 2]) / c
         scale = 1.0 / math.sqrt(x * x + y * y + z * z)
         s[0, i], s[1, i], s[2, i] = scale * x, scale * y, scale * z
 
@@ -283,14 +270,14 @@ def locate(points, gradients, chart, uv, frame, parameters):  # type: ignore[no-
 
     The frame does not see the factor r of d psi/ds, nor the length of y, so w - c serves for y.
     """
-    a, b, c = parameters[HALF_AXES], parameters[HALF_AXES + 1], parameters[HALF_AXES + 2]
+    a, b, c = parameters[AT.half_axes], parameters[AT.half_axes + 1], parameters[AT.half_axes + 2]
     for i in range(points.shape[1]):
         x, y, z = points[0, i], points[1, i], points[2, i]
         shift, slope = _spine((x, y, z), parameters)
         gx, gy, gz = _pulled((gradients[0, i], gradients[1, i], gradients[2, i]), slope, parameters)
-        x -= shift[0] + parameters[CENTRE]
-        y -= shift[1] + parameters[CENTRE + 1]
-        z -= shift[2] + parameters[CENTRE + 2]
+        x -= shift[0] + parameters[AT.centre]
+        y -= shift[1] + parameters[AT.centre + 1]
+        z -= shift[2] + parameters[AT.centre + 2]
         chart[i], uv[0, i], uv[1, i], tx, ty, tz, wx, wy, wz = cube_tangents(x / a, y / b, z / c)
         tx, ty, tz, wx, wy, wz = a * tx, b * ty, c * tz, a * wx, b * wy, c * wz
         scale = 1.0 / (gx * x + gy * y + gz * z)
@@ -300,11 +287,20 @@ def locate(points, gradients, chart, uv, frame, parameters):  # type: ignore[no-
         fill_frame(frame, i, tx, ty, tz, wx, wy, wz)
 
 
-ORIGIN, PER_SIDE, SHAPE, VOXELS, LEAN, OUTSIDE = 0, 3, 4, 7, 8, 9
-FIRST = 10
-CHART = 15
-# added to the score of a chart that is not valid
-BEHIND = 1e3
+class AtlasLayout(NamedTuple):
+    """Where values stand in the parameters of an atlas, and the width of the row of a chart."""
+
+    origin: int = 0
+    per_side: int = 3
+    shape: int = 4
+    voxels: int = 7
+    lean: int = 8
+    outside: int = 9
+    charts: int = 10
+    width: int = 15
+
+
+ATLAS = AtlasLayout()
 
 
 @njit(**OPTIONS)
@@ -319,23 +315,23 @@ def locate_graph(points, gradients, chart, uv, frame, parameters):  # type: igno
 
     Where no chart is valid, the one with the least max(|u - 1/2|, |v - 1/2|), else chart 0, with bounded u and v.
     """
-    least, beyond, voxels = parameters[LEAN], parameters[OUTSIDE], int(parameters[VOXELS])
+    least, beyond, voxels = parameters[ATLAS.lean], parameters[ATLAS.outside], int(parameters[ATLAS.voxels])
     for i in range(points.shape[1]):
         x, y, z = points[0, i], points[1, i], points[2, i]
         nx, ny, nz = gradients[0, i], gradients[1, i], gradients[2, i]
         scale = 1.0 / math.sqrt(nx * nx + ny * ny + nz * nz)
         nx, ny, nz = nx * scale, ny * scale, nz * scale
-        cell = voxel_place(x, parameters[ORIGIN], parameters[PER_SIDE], parameters[SHAPE])
-        cell = cell * int(parameters[SHAPE + 1])
-        cell += voxel_place(y, parameters[ORIGIN + 1], parameters[PER_SIDE], parameters[SHAPE + 1])
-        cell = cell * int(parameters[SHAPE + 2])
-        cell += voxel_place(z, parameters[ORIGIN + 2], parameters[PER_SIDE], parameters[SHAPE + 2])
+        cell = voxel_place(x, parameters[ATLAS.origin], parameters[ATLAS.per_side], parameters[ATLAS.shape])
+        cell = cell * int(parameters[ATLAS.shape + 1])
+        cell += voxel_place(y, parameters[ATLAS.origin + 1], parameters[ATLAS.per_side], parameters[ATLAS.shape + 1])
+        cell = cell * int(parameters[ATLAS.shape + 2])
+        cell += voxel_place(z, parameters[ATLAS.origin + 2], parameters[ATLAS.per_side], parameters[ATLAS.shape + 2])
         entry = int(parameters[voxels + cell])
         count = int(parameters[entry])
         number = int(parameters[entry + 1]) if count > 0 else 0
         best, s, t = math.inf, math.nan, math.nan
         for k in range(entry + 1, entry + 1 + count):
-            row = FIRST + CHART * int(parameters[k])
+            row = ATLAS.charts + ATLAS.width * int(parameters[k])
             qx, qy, qz = x - parameters[row], y - parameters[row + 1], z - parameters[row + 2]
             a = qx * parameters[row + 3] + qy * parameters[row + 4] + qz * parameters[row + 5]
             b = qx * parameters[row + 6] + qy * parameters[row + 7] + qz * parameters[row + 8]
@@ -344,13 +340,13 @@ def locate_graph(points, gradients, chart, uv, frame, parameters):  # type: igno
             lean = nx * parameters[row + 9] + ny * parameters[row + 10] + nz * parameters[row + 11]
             score = max(abs(a), abs(b))
             if not (lean >= least and h >= parameters[row + 13] and h <= parameters[row + 14]):
-                # behind every valid chart
-                score += BEHIND
+                # far behind every valid chart
+                score += 1e3
             if score < best:
                 best, s, t, number = score, a, b, int(parameters[k])
         chart[i], uv[0, i], uv[1, i] = number, _bounded(s, beyond), _bounded(t, beyond)
         # the polar frame of a chart over its tangent plane: the least rotation that takes N to n
-        row = FIRST + CHART * number
+        row = ATLAS.charts + ATLAS.width * number
         ex, ey, ez = parameters[row + 3], parameters[row + 4], parameters[row + 5]
         fx, fy, fz = parameters[row + 6], parameters[row + 7], parameters[row + 8]
         mx, my, mz = parameters[row + 9], parameters[row + 10], parameters[row + 11]

@@ -35,8 +35,6 @@ from creeping.kernels.cache import discard_stale, keep_private
 F = TypeVar("F", bound=Callable[..., Any])
 # products may be contracted to fused multiply-adds, nothing else: a NaN stays a NaN and no sum is reordered
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
-CLOSED_FORM = 50.0
-"""Operations of the level of a quadric."""
 SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 """Where xx, yy, zz, yz, xz, xy stand in a matrix."""
 
@@ -90,8 +88,8 @@ class Compiled:
 
     @property
     def operations(self) -> float:
-        """Floating-point operations of a point, about: as the source says, or those of a closed form."""
-        return float(getattr(self.source, "operations", CLOSED_FORM))
+        """Floating-point operations of a point, about: as the source says, or those of a quadric."""
+        return float(getattr(self.source, "operations", 50.0))
 
 
 @cache

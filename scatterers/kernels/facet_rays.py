@@ -15,12 +15,6 @@ from numba import njit
 
 from creeping.kernels.cache import discard_stale
 
-NOISE = 1e-13
-"""Volumes below this, in cubes of the pair's size, are rounding and count as touching."""
-FOLDED = 1e-6
-"""Angle between two triangles at their common edge, rad, below which they lie on each other."""
-
-
 discard_stale(Path(__file__).parents[1], every=True)
 
 
@@ -108,7 +102,8 @@ def _folded(a, b, c, d):  # type: ignore[no-untyped-def]
     if not (cd > 0.0 and cc > 1e-20 * ee and dd > 1e-20 * ee):
         return False
     x0, x1, x2 = c1 * d2 - c2 * d1, c2 * d0 - c0 * d2, c0 * d1 - c1 * d0
-    return x0 * x0 + x1 * x1 + x2 * x2 < FOLDED * FOLDED * cc * dd
+    # at an angle below 1e-6 they lie on each other
+    return x0 * x0 + x1 * x1 + x2 * x2 < 1e-12 * cc * dd
 
 
 @njit(cache=True, error_model="numpy")
@@ -148,7 +143,8 @@ def sweep(vertices, triangles, low, high, pairs):  # type: ignore[no-untyped-def
                 continue
             size = max(top - low[i, 0], y1 - y0, z1 - z0, high[j, 0] - low[j, 0])
             size = max(size, high[j, 1] - low[j, 1], high[j, 2] - low[j, 2])
-            if _meet(vertices, triangles[i], triangles[j], NOISE * size * size * size):
+            # smaller volumes, in cubes of the pair's size, are rounding, and count as touching
+            if _meet(vertices, triangles[i], triangles[j], 1e-13 * size * size * size):
                 if found < len(pairs):
                     pairs[found, 0], pairs[found, 1] = i, j
                 found += 1

@@ -22,20 +22,43 @@ Sources: [C76, sec. 3-3].
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from creeping._typing import FloatArray
 from scatterers.kernels.compiled import helper
-from scatterers.kernels.tensor import HEADER
+from scatterers.kernels.tensor import AT as OF_MAP
 
-# where values stand in the flat parameters: the axes of space that are u, v and w, the stretch of v, whether the
-# profile is of a whole body (1) or of a piece, which goes on beyond its ends (0), the number of segments; their rows
-PLACE, STRETCH, WHOLE, COUNT, ROWS = HEADER, HEADER + 3, HEADER + 4, HEADER + 5, HEADER + 6
-# of a row: points and unit tangents (w, r) at both ends, piece, kind, where its shape begins, sign of the corner before
-START, START_TANGENT, END, END_TANGENT, PIECE, KIND, SHAPE, CORNER, WIDTH = 0, 2, 4, 6, 8, 9, 10, 11, 12
-CONIC, SPLINE = 0.0, 1.0
-TINY = 1e-300
-NEWTON = 12
+
+class Layout(NamedTuple):
+    """Where values stand in the flat parameters, behind those of a map.
+
+    The axes of space that are u, v and w, the stretch of v, whether the profile is of a whole body (1) or of a piece,
+    which goes on beyond its ends (0), the number of segments, and their rows.
+    """
+
+    place: int = OF_MAP.end
+    stretch: int = OF_MAP.end + 3
+    whole: int = OF_MAP.end + 4
+    segments: int = OF_MAP.end + 5
+    rows: int = OF_MAP.end + 6
+
+
+class Row(NamedTuple):
+    """Of a row: point and unit tangent (w, r) at both ends, piece, whether it is a spline, where its shape begins.
+
+    Then the sign of the corner before.
+    """
+
+    start: int = 0
+    end: int = 4
+    piece: int = 8
+    splined: int = 9
+    shape: int = 10
+    corner: int = 11
+    width: int = 12
+
+
+AT, ROW = Layout(), Row()
 
 
 @helper
@@ -43,7 +66,7 @@ def _conic(r: float, w: float, at: int, p: FloatArray) -> tuple[float, float, fl
     a, b, c, d = p[at], p[at + 1], p[at + 2], p[at + 3]
     zeta = w - p[at + 5]
     value = (0.5 * a * r + b) * r + (0.5 * c * zeta + d) * zeta + p[at + 4]
-    return value, a * r + b, c * zeta + d, a, 0.0, c, a + b / max(r, TINY)
+    return value, a * r + b, c * zeta + d, a, 0.0, c, a + b / max(r, 1e-300)
 
 
 @helper
@@ -62,7 +85,7 @@ def _spline(r: float, w: float, at: int, p: FloatArray) -> tuple[float, float, f
     low, high = p[at], p[at + 1]
     reach = high - low
     s = 0.5 * (low + high)
-    for _ in range(NEWTON):
+    for _ in range(12):
         cw, tw, bw = _polynomial(s, at + 2, p)
         cr, tr, br = _polynomial(s, at + 8, p)
         square = tw * tw + tr * tr
@@ -88,19 +111,25 @@ def _spline(r: float, w: float, at: int, p: FloatArray) -> tuple[float, float, f
 @helper
 def meridian(r: float, w: float, row: int, p: FloatArray) -> tuple[float, float, float, float, float, float, float]:
     """G, G_r, G_w, G_rr, G_rw, G_ww and G_r/r of a segment's piece."""
-    at = int(p[row + SHAPE])
-    if p[row + KIND] == CONIC:
+    at = int(p[row + ROW.shape])
+    if p[row + ROW.splined] == 0.0:
         return _conic(r, w, at, p)
     return _spline(r, w, at, p)
 
 
 @helper
+def _ahead(r: float, w: float, at: int, p: FloatArray) -> float:
+    """How far a point is beyond an end of a segment, along the tangent there."""
+    along: float = (w - p[at]) * p[at + 2] + (r - p[at + 1]) * p[at + 3]
+    return along
+
+
+@helper
 def _distance(r: float, w: float, row: int, p: FloatArray) -> float:
     """Distance to a segment; between the normals at its ends along grad G, G taken as the quadratic that it is."""
-    w0, r0 = w - p[row + START], r - p[row + START + 1]
-    w1, r1 = w - p[row + END], r - p[row + END + 1]
-    after = w0 * p[row + START_TANGENT] + r0 * p[row + START_TANGENT + 1] >= 0.0
-    if after and w1 * p[row + END_TANGENT] + r1 * p[row + END_TANGENT + 1] < 0.0:
+    w0, r0 = w - p[row + ROW.start], r - p[row + ROW.start + 1]
+    w1, r1 = w - p[row + ROW.end], r - p[row + ROW.end + 1]
+    if _ahead(r, w, row + ROW.start, p) >= 0.0 and _ahead(r, w, row + ROW.end, p) < 0.0:
         value, gr, gw, rr, rw, ww, _ = meridian(r, w, row, p)
         square = gr * gr + gw * gw
         if square > 0.0:
@@ -108,7 +137,7 @@ def _distance(r: float, w: float, row: int, p: FloatArray) -> float:
         else:
             bend = max(abs(rr), abs(ww)) if value < 0.0 else -max(abs(rr), abs(ww))
         root = math.sqrt(max(square - 2.0 * value * bend, 0.0))
-        return 2.0 * abs(value) / max(math.sqrt(square) + root, TINY)
+        return 2.0 * abs(value) / max(math.sqrt(square) + root, 1e-300)
     return math.sqrt(min(w0 * w0 + r0 * r0, w1 * w1 + r1 * r1))
 
 
@@ -122,18 +151,18 @@ def _plane(r: float, w: float, at: int, p: FloatArray) -> float:
 @helper
 def nearest(r: float, w: float, p: FloatArray) -> int:
     """Where the row of the nearest segment begins."""
-    best, count = ROWS, int(p[COUNT])
+    best, count = AT.rows, int(p[AT.segments])
     if count == 1:
         return best
     least = _distance(r, w, best, p)
     for k in range(1, count):
-        row = ROWS + WIDTH * k
+        row = AT.rows + ROW.width * k
         distance = _distance(r, w, row, p)
         if distance < least:
             least, best = distance, row
-        elif distance == least and row == best + WIDTH:
+        elif distance == least and row == best + ROW.width:
             # nearest is the corner between both
-            if p[row + CORNER] * (_plane(r, w, row + START, p) - _plane(r, w, best + END, p)) > 0.0:
+            if p[row + ROW.corner] * (_plane(r, w, row + ROW.start, p) - _plane(r, w, best + ROW.end, p)) > 0.0:
                 best = row
     return best
 
@@ -143,32 +172,28 @@ def level(r: float, w: float, p: FloatArray) -> tuple[float, float, float, float
     """What `meridian` gives, of the nearest segment."""
     row = nearest(r, w, p)
     found = meridian(r, w, row, p)
-    if p[WHOLE] == 1.0:
-        after = (w - p[row + START]) * p[row + START_TANGENT] + (r - p[row + START + 1]) * p[
-            row + START_TANGENT + 1
-        ] >= 0.0
-        before = (w - p[row + END]) * p[row + END_TANGENT] + (r - p[row + END + 1]) * p[row + END_TANGENT + 1] < 0.0
-        if not (after and before):
-            w0, r0, w1, r1 = w - p[row], r - p[row + 1], w - p[row + END], r - p[row + END + 1]
-            end = START if w0 * w0 + r0 * r0 < w1 * w1 + r1 * r1 else END
+    if p[AT.whole] == 1.0:
+        if _ahead(r, w, row + ROW.start, p) < 0.0 or _ahead(r, w, row + ROW.end, p) >= 0.0:
+            w0, r0, w1, r1 = w - p[row], r - p[row + 1], w - p[row + ROW.end], r - p[row + ROW.end + 1]
+            end = ROW.start if w0 * w0 + r0 * r0 < w1 * w1 + r1 * r1 else ROW.end
             plane = _plane(r, w, row + end, p)
             if plane * found[0] < 0.0:
                 nw, nr = -p[row + end + 3], p[row + end + 2]
-                return plane, nr, nw, 0.0, 0.0, 0.0, nr / max(r, TINY)
+                return plane, nr, nw, 0.0, 0.0, 0.0, nr / max(r, 1e-300)
     return found
 
 
 def evaluate(points, values, gradients, hessians, parameters):  # type: ignore[no-untyped-def]
     """F, grad F and Hessian of a block, each point on the piece that is nearest."""
-    iu, iv, iw = int(parameters[PLACE]), int(parameters[PLACE + 1]), int(parameters[PLACE + 2])
-    stretch = parameters[STRETCH]
+    iu, iv, iw = int(parameters[AT.place]), int(parameters[AT.place + 1]), int(parameters[AT.place + 2])
+    stretch = parameters[AT.stretch]
     # rows of yz, xz and xy by the axis that is missing
     vw, uw, uv = 3 + iu, 3 + iv, 3 + iw
     for i in range(points.shape[1]):
         u, v, w = points[iu, i], stretch * points[iv, i], points[iw, i]
         r = math.sqrt(u * u + v * v)
         value, _, slope_w, rr, rw, ww, m = level(r, w, parameters)
-        over = 1.0 / max(r, TINY)
+        over = 1.0 / max(r, 1e-300)
         cosine, sine = u * over, v * over
         values[i] = value
         gradients[iu, i], gradients[iv, i], gradients[iw, i] = m * u, stretch * m * v, slope_w
@@ -186,10 +211,10 @@ evaluate.operations = 150.0  # type: ignore[attr-defined]
 
 def numbers(points, values, gradients, hessians, parameters):  # type: ignore[no-untyped-def]
     """Numbers of the nearest pieces, in the place of F; nothing else is filled."""
-    iu, iv, iw = int(parameters[PLACE]), int(parameters[PLACE + 1]), int(parameters[PLACE + 2])
+    iu, iv, iw = int(parameters[AT.place]), int(parameters[AT.place + 1]), int(parameters[AT.place + 2])
     for i in range(points.shape[1]):
-        u, v = points[iu, i], parameters[STRETCH] * points[iv, i]
-        values[i] = parameters[nearest(math.sqrt(u * u + v * v), points[iw, i], parameters) + PIECE]
+        u, v = points[iu, i], parameters[AT.stretch] * points[iv, i]
+        values[i] = parameters[nearest(math.sqrt(u * u + v * v), points[iw, i], parameters) + ROW.piece]
 
 
 def value_and_gradient(x: float, y: float, z: float, parameters: FloatArray) -> Any:

@@ -21,7 +21,8 @@ of the pieces gives the place of the parameters of each spline.
 Sources: [B78]; Derivations, B7 and B6.
 """
 
-from typing import Any
+from enum import IntEnum
+from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
@@ -31,9 +32,6 @@ from numba.extending import intrinsic
 from scatterers.kernels.compiled import OPTIONS
 
 LANES = 8
-# which derivatives (along x, y, z) `contract` returns, in this order
-FIRST = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
-SECOND = [*FIRST, (2, 0, 0), (0, 2, 0), (0, 0, 2), (0, 1, 1), (1, 0, 1), (1, 1, 0)]
 # w_j(t) = sum_m POWERS[m, j] t^m
 POWERS = (
     np.array(
@@ -52,20 +50,28 @@ POWERS = (
 DEGREE = 6
 # how far the polynomials go, in halves of the range they are fitted to: slanted tips pass between the grid's edges
 REACH = 1.5
-# where values stand in the flat parameters: shape, origin and 1/spacing of the grid from 0 on, then those of a radial
-# map: centre, half axes, axis of the spine with the middle and 1/half of its range (0 for no spine), shifts along x, y
-# and z, box of the sheared grid about the centre; behind them the coefficients
-CENTRE, HALF_AXES, AXIS, MIDDLE, PER_HALF, SHIFTS = 9, 12, 15, 16, 17, 18
-BOX = SHIFTS + 3 * (DEGREE + 1)
-HEADER = BOX + 6
 # lanes that the kernels load beyond the last row
 OVERREAD = 2
-# cells by which the polynomial of the last cell is continued beyond the grid
-BEYOND = 1.0
-# iterations of the search for a radius
-ITERATIONS = 60
-# a Newton step this small, relative to the radius, leaves an error below rounding
-SMALL = 1e-8
+
+
+class Layout(NamedTuple):
+    """Where values stand in the flat parameters: shape, origin and 1/spacing of the grid first, then those of a map.
+
+    Of a radial map the centre, half axes, axis of the spine with the middle and 1/half of its range (0 for no spine),
+    shifts along x, y and z, and the box of the sheared grid about the centre; at the end the coefficients begin.
+    """
+
+    centre: int = 9
+    half_axes: int = 12
+    axis: int = 15
+    middle: int = 16
+    per_half: int = 17
+    shifts: int = 18
+    box: int = 18 + 3 * (DEGREE + 1)
+    end: int = 24 + 3 * (DEGREE + 1)
+
+
+AT = Layout()
 
 
 _double, _index, _lane = ir.DoubleType(), ir.IntType(64), ir.IntType(32)
@@ -121,8 +127,10 @@ def _sums(builder: ir.IRBuilder, vectors: list[Any]) -> Any:
 
 
 def _contraction(order: int) -> Any:
-    """Make ``f(table, start, stride_x, stride_y, tx, ty, tz)`` -> derivatives FIRST or SECOND, in cells."""
-    wanted = FIRST if order == 1 else SECOND
+    """Make ``f(table, start, stride_x, stride_y, tx, ty, tz)`` -> derivatives up to the order, in cells."""
+    # along x, y and z
+    wanted = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+    wanted += [(2, 0, 0), (0, 2, 0), (0, 0, 2), (0, 1, 1), (1, 0, 1), (1, 1, 0)] if order == 2 else []
     result = types.UniTuple(types.float64, len(wanted))
 
     @intrinsic  # type: ignore[untyped-decorator]
@@ -214,8 +222,9 @@ def _cell(x, origin, per_length, cells):  # type: ignore[no-untyped-def]
     inside = g if g > 0.0 else 0.0
     cell = int(inside if inside < cells - 1.0 else cells - 1.0)
     t = g - cell
-    t = -BEYOND if t < -BEYOND else t
-    return cell, 1.0 + BEYOND if t > 1.0 + BEYOND else t
+    # the polynomial of the last cell is continued by one cell
+    t = -1.0 if t < -1.0 else t
+    return cell, 2.0 if t > 2.0 else t
 
 
 @njit(**OPTIONS)
@@ -226,7 +235,7 @@ def _stencil(x, y, z, parameters):  # type: ignore[no-untyped-def]
     k, tz = _cell(z, parameters[5], parameters[8], parameters[2] - 5.0)
     stride_y = int(parameters[2])
     stride_x = int(parameters[1]) * stride_y
-    return HEADER + i * stride_x + j * stride_y + k, stride_x, stride_y, tx, ty, tz
+    return AT.end + i * stride_x + j * stride_y + k, stride_x, stride_y, tx, ty, tz
 
 
 @njit(**OPTIONS)
@@ -303,8 +312,15 @@ def solve(factor, x):  # type: ignore[no-untyped-def]
             row[k] = (row[k] - near * before[k] - far * second[k]) * scale
 
 
-LARGER, SMALLER, BESIDES = -1, -2, -3
-"""Of the last two values, in a program; the last names a plane."""
+class Token(IntEnum):
+    """What a program takes of the last two values."""
+
+    LARGER = -1
+    SMALLER = -2
+    BESIDES = -3
+    """The last one on one side of a plane."""
+
+
 MOST_PIECES = 8
 """Values that a program holds at a time."""
 TABLES = 9
@@ -342,11 +358,11 @@ def chosen(x, y, z, parameters):  # type: ignore[no-untyped-def]
             height += 1
             continue
         height -= 1
-        if token == BESIDES:
+        if token == Token.BESIDES:
             last = parameters[k] * x + parameters[k + 1] * y + parameters[k + 2] * z > parameters[k + 3]
             k += 4
         else:
-            last = (values[height] > values[height - 1]) == (token == LARGER)
+            last = (values[height] > values[height - 1]) == (token == Token.LARGER)
         if last:
             values[height - 1], numbers[height - 1] = values[height], numbers[height]
     return numbers[0]

@@ -40,26 +40,12 @@ from scatterers.triangles.quality import Choice, whole_body
 from scatterers.triangles.topology import Edges, cleaned, edges_of, flat_normals, next_corner
 
 SUFFIXES = {".step": "STEP", ".stp": "STEP", ".iges": "IGES", ".igs": "IGES", ".brep": "BREP"}
-BEGINNINGS = {"STEP": r"\s*ISO-10303-21", "IGES": r".{72}[SFG]", "BREP": r"\s*(DBRep_DrawableShape|CASCADE Topology)"}
 POINTS = 10_000
 """Points of the body that are asked for."""
 TIMEOUT = 600
+"""Of gmsh, s."""
 SHARP = 2.0
 """Degrees between the normals of two faces at a common point that make an edge."""
-FAR_OFF = 60.0
-"""Degrees between the normal of a face and that of a triangle of it, beyond which a face has none there."""
-UNCERTAIN = 20.0
-"""Degrees between the normal of a face and that of the triangles: at a pole of its parameters a face has none."""
-LACKING, MOST_LACKING = 1.5, 16.0
-"""Points of all bodies of a file over those of the part that is asked for, from which it is meshed again, with so many
-times the points at most."""
-# what a STEP file may call its length unit
-PREFIXES = {"$": "m", ".MILLI.": "mm", ".CENTI.": "cm", ".MICRO.": "um", ".KILO.": "km"}
-IGES_UNITS = {1: "in", 2: "mm", 4: "ft", 6: "m", 7: "km", 9: "um", 10: "cm"}
-JUMP = 0.3
-"""Of the larger curvature: where a resolved mesh's curvature only varies, two sides of an edge differ by less."""
-FLAT = 1e-3
-"""Curvature times edge below which a face counts as plane."""
 
 
 Note = Callable[[str], None]
@@ -210,15 +196,20 @@ def _chosen(path: Path, reading: CadReading, curved: int) -> _Chosen:
         vertices, triangles = cleaned_apart(path.name, before, triangles, of, bounds, repairs.append)
         vertices, triangles = whole_body(path.name, vertices, triangles, reading.choice, scale, repairs.append)
         lacking = len(before) / max(len(vertices), 1)
-        if not (again and lacking > LACKING):
+        if not (again and lacking > 1.5):
             break
-        # points were for all bodies of the file together
-        found = _meshed(path, int(reading.points * min(lacking, MOST_LACKING)), reading.sew, curved)
+        # points were for all bodies of the file together; with 16 times as many at most
+        found = _meshed(path, int(reading.points * min(lacking, 16.0)), reading.sew, curved)
     return _Chosen(found, number, used, before, vertices, triangles, scale, repairs)
 
 
 def kind_of(path: Path) -> str:
     """STEP, IGES or BREP, by name and beginning, or ValueError; nothing else of the file is read."""
+    beginnings = {
+        "STEP": r"\s*ISO-10303-21",
+        "IGES": r".{72}[SFG]",
+        "BREP": r"\s*(DBRep_DrawableShape|CASCADE Topology)",
+    }
     kind = SUFFIXES.get(path.suffix.lower())
     if kind is None:
         raise ValueError(f"{path.name} is none of {', '.join(SUFFIXES)}; export the body as STEP")
@@ -229,7 +220,7 @@ def kind_of(path: Path) -> str:
         raise ValueError(f"{path.name} has {size} bytes; give a CAD file of at most {MOST_BYTES}")
     with path.open("rb") as file:
         start = file.read(4096)
-    if not re.match(BEGINNINGS[kind], start.decode("latin-1")):
+    if not re.match(beginnings[kind], start.decode("latin-1")):
         what = what_else(start)
         raise ValueError(
             f"{path.name} does not begin as {kind} files do" + (f": it is {what}" if what else "; export it again")
@@ -265,13 +256,15 @@ def _stated(path: Path, kind: str) -> str | None:
             if re.search(rf"CONVERSION_BASED_UNIT\({name}", compact, re.IGNORECASE):
                 return unit
         found = re.search(r"SI_UNIT\((\$|\.[A-Z]+\.),\.METRE\.\)", compact)
-        return PREFIXES.get(found[1]) if found else None
+        prefixes = {"$": "m", ".MILLI.": "mm", ".CENTI.": "cm", ".MICRO.": "um", ".KILO.": "km"}
+        return prefixes.get(found[1]) if found else None
     if kind == "IGES":
         globals_ = "".join(line[:72] for line in text.splitlines() if line[72:73] == "G")
         # strings are nH...; their commas do not separate
         fields = re.split(r"[,;]", _without_strings(globals_))
         with_flag = fields[13].strip() if len(fields) > 13 else ""
-        return IGES_UNITS.get(int(with_flag)) if with_flag.isdigit() else None
+        by_flag = {1: "in", 2: "mm", 4: "ft", 6: "m", 7: "km", 9: "um", 10: "cm"}
+        return by_flag.get(int(with_flag)) if with_flag.isdigit() else None
     return None
 
 
@@ -348,7 +341,8 @@ def _corner_normals(
         mine = of == tag
         if np.sum((n[mine] * flat[mine, None])[there[mine]]) < 0:
             n[mine] *= -1
-    there &= np.sum(n * flat[:, None], axis=2) > np.cos(np.radians(FAR_OFF))
+    # a face that leans by more has none there
+    there &= np.sum(n * flat[:, None], axis=2) > np.cos(np.radians(60.0))
     return np.where(there[..., None], n, flat[:, None]), there
 
 
@@ -383,7 +377,8 @@ def _vertex_normals(mesh: TriangleMesh, corners: FloatArray, known: BoolArray) -
     with np.errstate(invalid="ignore"):
         mean = total / np.linalg.norm(total, axis=1, keepdims=True)
     along = np.sum(mean * angle_weighted_normals(mesh.vertices, mesh.triangles), axis=1)
-    mean[~(along > np.cos(np.radians(UNCERTAIN)))] = np.nan
+    # at a pole of its parameters a face has none
+    mean[~(along > np.cos(np.radians(20.0)))] = np.nan
     return np.asarray(mean)
 
 
@@ -464,7 +459,8 @@ def curvature_jumps(
         mine = joint.ravel() == number
         jump = abs(float(np.median(bends[mine, 0] - bends[mine, 1])))
         larger = float(np.median(np.abs(bends[mine]).max(axis=1)))
-        if larger * float(np.median(length[mine])) > FLAT and jump > JUMP * larger:
+        # not both planes; where a resolved mesh's curvature only varies, two sides of an edge differ by less
+        if larger * float(np.median(length[mine])) > 1e-3 and jump > 0.3 * larger:
             jumps[at[mine]] = True
     return jumps
 

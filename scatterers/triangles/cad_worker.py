@@ -12,9 +12,6 @@ import sys
 
 import numpy as np
 
-SMALLER = 8.0
-"""How much smaller triangles are at most where faces curve."""
-
 
 def main(path: str, points: int, out: str, curved: int = 0, sew: float = 0.0) -> None:
     """Mesh the faces of the file and write what is found."""
@@ -32,8 +29,9 @@ def main(path: str, points: int, out: str, curved: int = 0, sew: float = 0.0) ->
     area = sum(gmsh.model.occ.getMass(2, tag) for tag in faces)
     # a mesh of equilateral triangles has area/(0.866 edge^2) vertices
     edge = float(np.sqrt(area / (0.866 * points)))
+    # smaller where faces curve, down to an eighth
     for option, value in (
-        ("Mesh.MeshSizeMin", edge / SMALLER if curved else edge),
+        ("Mesh.MeshSizeMin", edge / 8.0 if curved else edge),
         ("Mesh.MeshSizeMax", edge),
         ("Mesh.MeshSizeFromPoints", 0),
         ("Mesh.MeshSizeExtendFromBoundary", 0),

@@ -13,17 +13,12 @@ import re
 import zlib
 from collections.abc import Callable, Iterator
 from itertools import islice
+from pathlib import Path
 
 import numpy as np
 
 from creeping._typing import FloatArray, IntArray
 
-CORNERS = {2: 3, 3: 4}
-"""Nodes of the triangles and quadrangles of MSH files, by their kinds."""
-CURVED = (9, 10, 16, 20, 21, 23, 25)
-"""Kinds of those with nodes along their edges."""
-CARDS = {"CTRIA3": 3, "CTRIAR": 3, "CQUAD4": 4, "CQUADR": 4}
-CURVED_CARDS = ("CTRIA6", "CQUAD8", "CQUAD")
 SUFFIXES = (".stl", ".obj", ".ply", ".off", ".glb", ".3mf", ".msh", ".bdf", ".mesh")
 """Endings of names of files that are read, beside .nas, which is .bdf, and .gz."""
 MESHES = {
@@ -53,20 +48,8 @@ OTHERS = {
     rb"\s*\{": "a JSON file, such as glTF in parts; export the body as .glb",
 }
 """Beginnings of files that are no meshes that are read, what they are, and what to do."""
-UTF16 = {
-    rb"\xff\xfe|\xfe\xff": "utf-16",
-    rb"([\t\n\r -~]\0){16}": "utf-16-le",
-    rb"(\0[\t\n\r -~]){16}": "utf-16-be",
-}
-"""Beginnings of texts in UTF-16, with a byte order mark or without."""
-TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-"""Of a binary STL."""
 HEAD = 4096
 """Bytes that tell what a file is."""
-COMMA = re.compile(
-    rb"^[ \t]*(?:(?:vn?|vertex|facet[ \t]+normal)[ \t]+)?(?:[-+.\deE]+[ \t]+)*[-+]?\d+,\d[^\r\n]*", re.MULTILINE
-)
-EXPONENT = re.compile(rb"(?<!\S)([-+]?(?:\d+\.?\d*|\.\d+))[dD]([-+]?\d+)(?!\S)")
 
 
 Read = tuple[FloatArray, IntArray]
@@ -89,6 +72,8 @@ def read_msh(data: bytes) -> Read:
     >>> read_msh(b"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n" + nodes + elements)[1]
     array([[0, 1, 2]])
     """
+    # nodes of triangles and quadrangles by their kinds, and the kinds of those with nodes along their edges
+    flat, curved = {2: 3, 3: 4}, (9, 10, 16, 20, 21, 23, 25)
     parts = dict(re.findall(rb"^\$(\w+)\s*\n(.*?)^\$End\1\b", data, re.MULTILINE | re.DOTALL))
     version, binary = [*parts.get(b"MeshFormat", b"").split(), b"", b""][:2]
     if binary != b"0" or version not in (b"2", b"2.1", b"2.2", b"4.1"):
@@ -110,9 +95,9 @@ def read_msh(data: bytes) -> Read:
         head = _rows(elements, 1)[0]
         for row in _rows(elements, int(head[number])):
             kind = int(row[1] if number < 0 else head[2])
-            if kind in CURVED:
+            if kind in curved:
                 raise ValueError("it has curved elements, where those of order 1 alone are read")
-            faces += _split([int(word) for word in row[-CORNERS[kind] :]]) if kind in CORNERS else []
+            faces += _split([int(word) for word in row[-flat[kind] :]]) if kind in flat else []
     return _numbered(numbers, places, faces)
 
 
@@ -174,11 +159,12 @@ def read_bdf(data: bytes) -> Read:
     >>> vertices[1].tolist(), triangles.tolist()
     ([15.0, 0.0, 0.0], [[0, 1, 2]])
     """
+    corners = {"CTRIA3": 3, "CTRIAR": 3, "CQUAD4": 4, "CQUADR": 4}
     numbers: list[int] = []
     places: list[list[float]] = []
     faces: list[list[int]] = []
     for name, *fields in _cards(data.decode("latin-1")):
-        if name == "INCLUDE" or name in CURVED_CARDS:
+        if name == "INCLUDE" or name in ("CTRIA6", "CQUAD8", "CQUAD"):
             raise ValueError(f"it has the card {name}, which is not read")
         if name == "GRID" and fields[1] not in ("", "0"):
             raise ValueError(f"node {fields[0]} is in the coordinates {fields[1]}, not in the basic ones")
@@ -186,8 +172,8 @@ def read_bdf(data: bytes) -> Read:
             if name == "GRID":
                 numbers.append(int(fields[0]))
                 places.append([_number(field) for field in fields[2:5]])
-            elif name in CARDS:
-                faces += _split([int(field) for field in fields[2 : 2 + CARDS[name]]])
+            elif name in corners:
+                faces += _split([int(field) for field in fields[2 : 2 + corners[name]]])
         except ValueError:
             raise ValueError(f"{name} {fields[0]} has a field that is no number") from None
     return _numbered(numbers, places, faces)
@@ -247,9 +233,15 @@ def understood(name: str, suffix: str, data: bytes, limit: int, note: Note) -> t
     ValueError
         If it is no mesh of a kind that is read; says what it is.
     """
+    # beginnings with a byte order mark or without
+    utf16 = {
+        rb"\xff\xfe|\xfe\xff": "utf-16",
+        rb"([\t\n\r -~]\0){16}": "utf-16-le",
+        rb"(\0[\t\n\r -~]){16}": "utf-16-be",
+    }
     if data.startswith(b"\x1f\x8b"):
-        data, suffix = _unpacked(name, data, limit), _ending(name.lower().removesuffix(".gz"))
-    if encoding := next((code for sign, code in UTF16.items() if re.match(sign, data)), None):
+        data, suffix = _unpacked(name, data, limit), Path(name.lower().removesuffix(".gz")).suffix
+    if encoding := next((code for sign, code in utf16.items() if re.match(sign, data)), None):
         data = data.decode(encoding, "replace").encode()
     data = data.removeprefix(b"\xef\xbb\xbf")
     # what editors and copies leave behind a text
@@ -288,10 +280,6 @@ def what_else(data: bytes) -> str | None:
     return next((what for sign, what in OTHERS.items() if re.match(sign, data[:HEAD], re.IGNORECASE)), None)
 
 
-def _ending(name: str) -> str:
-    return f".{name.rpartition('.')[2]}" if "." in name else ""
-
-
 def _unpacked(name: str, data: bytes, limit: int) -> bytes:
     try:
         with gzip.open(io.BytesIO(data)) as stream:
@@ -305,9 +293,10 @@ def _unpacked(name: str, data: bytes, limit: int) -> bytes:
 
 def _whole_stl(name: str, data: bytes, note: Note) -> bytes:
     """A binary STL as long as its header states, where what it holds leaves no doubt."""
+    triangle = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
     count, held = int.from_bytes(data[80:84], "little"), len(data) - 84
     if held > 50 * count and held % 50 == 0:
-        corners = np.frombuffer(data, TRIANGLE, offset=84 + 50 * count)["corners"]
+        corners = np.frombuffer(data, triangle, offset=84 + 50 * count)["corners"]
         if np.all(np.isfinite(corners)) and np.all(np.any(corners != np.roll(corners, 1, axis=1), axis=2)):
             note(f"the header of {name} states {count} triangles, its bytes are those of {held // 50}; all taken")
             return data[:80] + (held // 50).to_bytes(4, "little") + data[84:]
@@ -320,15 +309,20 @@ def _whole_stl(name: str, data: bytes, note: Note) -> bytes:
 
 
 def _text(name: str, kind: str, data: bytes) -> bytes:
+    comma = re.compile(
+        rb"^[ \t]*(?:(?:vn?|vertex|facet[ \t]+normal)[ \t]+)?(?:[-+.\deE]+[ \t]+)*[-+]?\d+,\d[^\r\n]*", re.MULTILINE
+    )
     data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if kind == ".obj":
         # lines that go on
         data = data.replace(b"\\\n", b" ")
     # looked for in vain these take seconds
-    if b"," in data and (found := COMMA.search(data)):
-        count, line = len(COMMA.findall(data)), data.count(b"\n", 0, found.start()) + 1
+    if b"," in data and (found := comma.search(data)):
+        count, line = len(comma.findall(data)), data.count(b"\n", 0, found.start()) + 1
         raise ValueError(
             f"{count} lines of {name} have decimal commas, the first is line {line}, "
             f"{found[0].strip()[:60].decode('latin-1')!r}; export it with decimal points"
         )
-    return EXPONENT.sub(rb"\1e\2", data) if re.search(rb"[dD][-+]?\d", data) else data
+    if not re.search(rb"[dD][-+]?\d", data):
+        return data
+    return re.sub(rb"(?<!\S)([-+]?(?:\d+\.?\d*|\.\d+))[dD]([-+]?\d+)(?!\S)", rb"\1e\2", data)

@@ -23,21 +23,10 @@ from scatterers.triangles.quality import Choice, whole_body
 from scatterers.triangles.subdivision import Subdivision
 from scatterers.triangles.topology import cleaned, crossings, oriented
 
-DECKS = {".msh": read_msh, ".bdf": read_bdf, ".mesh": read_medit}
 UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "in": 0.0254, "ft": 0.3048, "km": 1e3}
 """Metres per unit."""
-SPELLED = {
-    "meter": "m", "metre": "m", "millimeter": "mm", "millimetre": "mm", "centimeter": "cm", "centimetre": "cm",
-    "micron": "um", "micrometer": "um", "inch": "in", "inche": "in", "foot": "ft", "feet": "ft", "kilometer": "km",
-}  # fmt: skip
 MOST_BYTES = 512 * 2**20
 MOST_TRIANGLES = 4_000_000
-SMALLEST, LARGEST = 1e-9, 1e9
-"""Sizes of a body that are believed, m."""
-FAR = 100.0
-"""Sizes from the origin beyond which a body is brought back: there differences of coordinates lose digits."""
-COARSEST_ROUNDING = 1e-3
-"""Rounding of the coordinates, in mean edges, from which on curvatures are those of the rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +111,8 @@ def read_mesh(
         # rounding tears a surface and folds it
         _check_rounding(raw.name, raw.vertices, chosen, torn=True)
         raise
-    if np.linalg.norm(offset) > FAR * np.linalg.norm(np.ptp(vertices, axis=0)):
+    # so far off, differences of coordinates lose digits
+    if np.linalg.norm(offset) > 100.0 * np.linalg.norm(np.ptp(vertices, axis=0)):
         note(
             f"{raw.name} lies {np.linalg.norm(offset) * scale:.6g} m from the origin; "
             f"moved by {_where(-offset * scale)}"
@@ -136,7 +126,9 @@ def _one_body(
 ) -> tuple[FloatArray, IntArray, FloatArray, FloatArray]:
     """Vertices and triangles of a closed surface, the middle of its box, and the vertices relative to that."""
     vertices, triangles = cleaned(raw.name, raw.vertices, chosen, note if raw.indexed else silent, note)
-    _check_size(raw.name, vertices, scale)
+    size = float(np.ptp(vertices, axis=0).max()) * scale
+    if not 1e-9 <= size <= 1e9:
+        raise ValueError(f"{raw.name} is {size:.3g} m large; give the right units, or a body from 1e-09 to 1e+09 m")
     vertices, triangles = whole_body(
         raw.name, vertices, triangles, choice, scale, note, named=chosen is not raw.triangles
     )
@@ -260,10 +252,11 @@ def _loaded(
     data: bytes, suffix: str, named: bool
 ) -> tuple[FloatArray, IntArray, str | None, tuple[tuple[str, int], ...]]:
     """Vertices and triangles of everything in the file, the unit it states, and its parts: name, triangles."""
+    decks = {".msh": read_msh, ".bdf": read_bdf, ".mesh": read_medit}
     if suffix == ".3mf":
         return read_3mf(data, MOST_BYTES, MOST_TRIANGLES)
-    if suffix in DECKS:
-        return *DECKS[suffix](data), None, ()
+    if suffix in decks:
+        return *decks[suffix](data), None, ()
     import trimesh
 
     # else all objects of an OBJ file are one part, by the name of the first
@@ -315,10 +308,14 @@ def _check_numbers(raw: _Raw) -> None:
 
 
 def _unit(raw: _Raw, given: str | None, otherwise: str | None) -> str:
+    spelled = {
+        "meter": "m", "metre": "m", "millimeter": "mm", "millimetre": "mm", "centimeter": "cm", "centimetre": "cm",
+        "micron": "um", "micrometer": "um", "inch": "in", "inche": "in", "foot": "ft", "feet": "ft", "kilometer": "km",
+    }  # fmt: skip
     stated = None
     if raw.stated is not None:
         word = str(raw.stated).strip().lower()
-        stated = word if word in UNITS else SPELLED.get(word.removesuffix("s"), SPELLED.get(word))
+        stated = word if word in UNITS else spelled.get(word.removesuffix("s"), spelled.get(word))
         if stated is None:
             raise ValueError(f"{raw.name} states the unit {raw.stated!r}, none of {', '.join(UNITS)}; convert it")
     if stated is not None and given is not None and stated != given:
@@ -337,14 +334,6 @@ def _unit(raw: _Raw, given: str | None, otherwise: str | None) -> str:
     return unit
 
 
-def _check_size(name: str, vertices: FloatArray, scale: float) -> None:
-    size = float(np.ptp(vertices, axis=0).max()) * scale
-    if not SMALLEST <= size <= LARGEST:
-        raise ValueError(
-            f"{name} is {size:.3g} m large; give the right units, or a body from {SMALLEST:g} to {LARGEST:g} m"
-        )
-
-
 def _check_rounding(name: str, vertices: FloatArray, triangles: IntArray, *, torn: bool = False) -> None:
     # of what is torn the largest numbers tell enough
     column = np.abs(vertices).max(axis=0).argmax() if torn else slice(None)
@@ -354,7 +343,8 @@ def _check_rounding(name: str, vertices: FloatArray, triangles: IntArray, *, tor
         return
     quantum = float(np.spacing(np.abs(single).max()))
     edge = float(np.mean(np.linalg.norm(vertices[triangles] - vertices[np.roll(triangles, 1, axis=1)], axis=-1)))
-    if quantum > COARSEST_ROUNDING * edge:
+    # then curvatures would be those of the rounding
+    if quantum > 1e-3 * edge:
         raise ValueError(
             f"the numbers of {name} are rounded to {quantum:.2g}, where its mean edge is {edge:.2g}, as it lies far "
             "from the origin in single precision, or with few digits; move it to the origin before it is exported"

@@ -26,18 +26,6 @@ import numpy as np
 
 from creeping._typing import FloatArray, IntArray
 
-PLY_BYTES = {
-    name: size
-    for size, names in (
-        (1, b"char uchar int8 uint8"),
-        (2, b"short ushort int16 uint16"),
-        (4, b"int uint float int32 uint32 float32"),
-        (8, b"double float64 int64 uint64"),
-    )
-    for name in names.split()
-}
-"""Sizes of the numbers of a binary PLY."""
-
 
 def check_whole(name: str, suffix: str, data: bytes) -> None:
     """Refuse a file that is shorter than it says, or whose rows are none of its format.
@@ -108,22 +96,32 @@ def _ply(name: str, cut: str, data: bytes) -> None:
 
 def _ply_bytes(name: str, cut: str, big: bool, elements: list[tuple[bytes, bytes, bytes]], body: bytes) -> None:
     """Refuse a binary PLY whose rows do not fill it; loaders take the length of its first list for that of all."""
+    sizes = {
+        name: size
+        for size, names in (
+            (1, b"char uchar int8 uint8"),
+            (2, b"short ushort int16 uint16"),
+            (4, b"int uint float int32 uint32 float32"),
+            (8, b"double float64 int64 uint64"),
+        )
+        for name in names.split()
+    }
     at = 0
     for _, count, properties in elements:
         kinds = [line.split()[1:-1] for line in properties.strip().splitlines() if line.split()[:1] == [b"property"]]
         if any(len(kind) != (3 if kind[:1] == [b"list"] else 1) for kind in kinds):
             raise ValueError(f"the header of {name} has a property that is none; export it again")
         lists = [kind for kind in kinds if kind[0] == b"list"]
-        if len(lists) > 1 or any(word not in PLY_BYTES for kind in kinds for word in kind if word != b"list"):
+        if len(lists) > 1 or any(word not in sizes for kind in kinds for word in kind if word != b"list"):
             return
-        fixed = sum(PLY_BYTES[kind[0]] for kind in kinds if kind[0] != b"list")
+        fixed = sum(sizes[kind[0]] for kind in kinds if kind[0] != b"list")
         if int(count) > len(body):
             raise ValueError(f"{cut}: its header states {int(count):.3g} rows, it has {len(body)} bytes")
         if not lists:
             at += fixed * int(count)
             continue
-        place = sum(PLY_BYTES[kind[0]] for kind in kinds[: kinds.index(lists[0])])
-        wide, item = PLY_BYTES[lists[0][1]], PLY_BYTES[lists[0][2]]
+        place = sum(sizes[kind[0]] for kind in kinds[: kinds.index(lists[0])])
+        wide, item = sizes[lists[0][1]], sizes[lists[0][2]]
         # all as long as the first, in most files
         length = int.from_bytes(body[at + place : at + place + wide], "big" if big else "little")
         step = fixed + wide + item * length
@@ -213,12 +211,6 @@ def _of(count: int, kind: str, name: str) -> str:
     return f"{count} {kind} row{'s' if count > 1 else ''} of {name} {'have' if count > 1 else 'has'}"
 
 
-PART = "3d/3dmodel.model"
-DEEPEST = 16
-MOST_PARTS = 1000
-MOST_CORNERS = 4
-
-
 Names = tuple[tuple[str, int], ...]
 Placed = tuple[str, Any, Any, FloatArray]
 
@@ -250,7 +242,7 @@ def read_3mf(data: bytes, limit: int, most_triangles: int) -> tuple[FloatArray, 
 def _part(data: bytes, limit: int) -> bytes:
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            found = [info for info in archive.infolist() if info.filename.lower().lstrip("/") == PART]
+            found = [info for info in archive.infolist() if info.filename.lower().lstrip("/") == "3d/3dmodel.model"]
             if not found:
                 raise ValueError("it holds no part 3D/3dmodel.model")
             if found[0].file_size > limit:
@@ -309,8 +301,8 @@ class _Model:
             own = self.names.get(name, above)
             parts += 1
             inside = self.components.get(name, [])
-            if depth > DEEPEST or parts + len(waiting) + len(inside) > MOST_PARTS:
-                raise ValueError(f"its components are nested deeper than {DEEPEST} or more than {MOST_PARTS}")
+            if depth > 16 or parts + len(waiting) + len(inside) > 1000:
+                raise ValueError("its components are nested deeper than 16 or more than 1000")
             waiting += [(inner, np.asarray(m @ matrix), depth + 1, own) for inner, m in inside]
             yield own or f"object {name}", self.vertices.get(name, []), self.triangles.get(name, []), matrix.T
 
@@ -381,7 +373,7 @@ def with_triangles(data: bytes, most: int) -> bytes:
     vertices, faces = int(header[1]), int(header[2])
     rows = lines[begin + vertices : begin + vertices + faces]
     corners = [int(row[0]) if row[0].isdigit() else 0 for row in rows]
-    if max(corners, default=0) <= MOST_CORNERS:
+    if max(corners, default=0) <= 4:
         return data
     whole = sum(max(n - 2, 0) for n in corners)
     if whole > most:
@@ -390,7 +382,7 @@ def with_triangles(data: bytes, most: int) -> bytes:
     split: list[list[bytes]] = []
     for number, (row, n) in enumerate(zip(rows, corners, strict=True)):
         face = row[1 : n + 1]
-        if n > MOST_CORNERS:
+        if n > 4:
             face = _turned(face, points, number)
         split += [[b"3", face[0], *face[k : k + 2]] for k in range(1, n - 1)]
     states = [[header[0]], [str(vertices).encode(), str(len(split)).encode(), b"0"]]

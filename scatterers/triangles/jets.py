@@ -25,23 +25,12 @@ from creeping._typing import BoolArray, FloatArray, IntArray
 
 NEIGHBOURS = 56
 """Twice the terms of degree 6: enough to show in the residual what the jet misses."""
-AT_MOST = 112
-"""Neighbours where the usual ones leave terms open, as on long triangles."""
 FEWEST = 36
 """Neighbours below which a jet of degree 6 is not fitted."""
 SHARE = 5000
 """Vertices, triangles or points treated at a time."""
-RIDGE = 2e-4
-"""Least singular value, relative to terms of size 1, at which a combination of terms still counts."""
-WEAK = 0.02
-"""Part of a column that is new against its predecessors, below which more neighbours are asked."""
-SAME_SHEET = 0.3
-"""Cosine between the normals of a vertex and its neighbours."""
-STEPS, FOOT_STEPS = 3, 8
 # powers of u and v in the order of `Jets.coefficients`
 POWERS = [(d - b, b) for d in range(1, 7) for b in range(d + 1)]
-DEGREES = (5, 14, 27)
-"""Terms of degree 2, 4 and 6, and less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,12 +126,15 @@ def _fitted(
     Fitted twice: frames of the second time have the normals of the first. Of ``counts`` neighbours the first
     `NEIGHBOURS` are taken, and more by a quarter while these leave a term open.
     """
+    # terms of degree 2, 4 and 6, and less
+    degrees = (5, 14, 27)
     n, terms = len(vertices), len(POWERS)
     frames, radii, residuals = _frames(normals), np.empty(n), np.empty((n, 3))
     coefficients, lower = np.zeros((n, terms)), np.zeros((n, terms))
     count, times = np.minimum(counts, NEIGHBOURS), np.where(counts > 0, 0, 2)
-    # rows below the data bound combinations of terms that the points leave open: of none of slopes and curvatures
-    ridge = RIDGE * np.diag(np.arange(terms) >= DEGREES[0])
+    # rows below the data bound combinations of terms, of size 1, that the points leave open: of none of slopes and
+    # curvatures
+    ridge = 2e-4 * np.diag(np.arange(terms) >= degrees[0])
     while len(waiting := np.flatnonzero(times < 2)):
         k = waiting[count[waiting] == count[waiting[0]]][:SHARE]
         away = vertices[near[k, : count[k[0]]]] - vertices[k][:, None]
@@ -157,12 +149,13 @@ def _fitted(
         right = np.pad(height, ((0, 0), (0, terms)))[..., None]
         triangle = np.asarray(np.linalg.qr(np.concatenate([whole, right], axis=2), mode="r"))
         new = np.abs(np.einsum("njj->nj", triangle)[:, :terms]) / np.linalg.norm(whole, axis=1)
-        weak = (new.min(axis=1) < WEAK) & (count[k] < counts[k])
+        # hardly anything of a column is new against its predecessors
+        weak = (new.min(axis=1) < 0.02) & (count[k] < counts[k])
         count[k[weak]] = np.minimum(count[k[weak]] * 5 // 4, counts[k[weak]])
         times[k] = np.where(weak, 0, times[k] + 1)
         done, triangle = k[~weak], triangle[~weak]
         # the leading columns are those of the lower degrees
-        for d, t in enumerate(DEGREES):
+        for d, t in enumerate(degrees):
             found = np.linalg.solve(triangle[:, :t, :t], triangle[:, :t, terms:])
             left = height[~weak] - (columns[~weak, :, :t] @ found)[..., 0]
             residuals[done, d] = np.linalg.norm(left, axis=1) / np.linalg.norm(weight[~weak], axis=1)
@@ -219,20 +212,22 @@ def _neighbours(vertices: FloatArray, normals: FloatArray) -> tuple[IntArray, In
     """Nearest vertices (n, 112) whose normals agree, nearest first, and how many (n,); 0 if too few."""
     from scipy.spatial import cKDTree
 
+    # twice as many where the usual ones leave terms open, as on long triangles
+    most = 2 * NEIGHBOURS
     tree, n = cKDTree(vertices), len(vertices)
-    near, counts = np.zeros((n, AT_MOST), np.int64), np.zeros(n, np.int64)
-    waiting, asked = np.arange(n), AT_MOST + 8
+    near, counts = np.zeros((n, most), np.int64), np.zeros(n, np.int64)
+    waiting, asked = np.arange(n), most + 8
     for _ in range(3):
         asked = min(asked, n)
         for start in range(0, len(waiting), SHARE):
             some = waiting[start : start + SHARE]
             found = tree.query(vertices[some], asked)[1].reshape(len(some), asked)
             cosine = np.einsum("ijk,ik->ij", normals[found], normals[some])
-            good = (cosine > SAME_SHEET) & (found != some[:, None])
+            good = (cosine > 0.3) & (found != some[:, None])
             # stable: the good ones first, in order of distance
-            order = np.argsort(~good, axis=1, kind="stable")[:, :AT_MOST]
+            order = np.argsort(~good, axis=1, kind="stable")[:, :most]
             near[some, : order.shape[1]] = np.take_along_axis(found, order, axis=1)
-            counts[some] = np.minimum(good.sum(axis=1), AT_MOST)
+            counts[some] = np.minimum(good.sum(axis=1), most)
         waiting = waiting[counts[waiting] < NEIGHBOURS]
         if not len(waiting) or asked == n:
             break
@@ -261,7 +256,7 @@ def centroids(vertices: FloatArray, triangles: IntArray, jets: Jets) -> tuple[Fl
     for start in range(0, len(triangles), SHARE):
         some = triangles[start : start + SHARE]
         at = vertices[some].mean(axis=1)
-        for _ in range(STEPS):
+        for _ in range(3):
             value, gradient = _distance(vertices, jets, some, at)
             at = at - (value / np.sum(gradient**2, axis=1))[:, None] * gradient
         gradient = _distance(vertices, jets, some, at)[1]
@@ -288,7 +283,7 @@ def signed_distance(vertices: FloatArray, jets: Jets, at: FloatArray) -> FloatAr
 def _foot(vertices: FloatArray, jets: Jets, i: IntArray, at: FloatArray) -> FloatArray:
     u0, v0, w0 = np.einsum("nij,nj->in", jets.frames[i], at - vertices[i]) / jets.radii[i]
     u, v = np.zeros_like(u0), np.zeros_like(v0)
-    for _ in range(FOOT_STEPS):
+    for _ in range(8):
         h, hu, hv, huu, huv, hvv = _jet(jets, i, u, v)
         gap = h - w0
         a, b, c = 1 + hu * hu + gap * huu, hu * hv + gap * huv, 1 + hv * hv + gap * hvv

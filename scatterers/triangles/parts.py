@@ -38,11 +38,6 @@ from scatterers.triangles.topology import (
     umbrellas,
 )
 
-LISTED = 8
-"""Parts that an error lists."""
-MOST_SHARED = 100_000
-"""Edges of more than two triangles beyond which a mesh is soup, and left as it is."""
-ROUNDS = 6
 MOST_CUT = 0.1
 """Share of the area that may be cut out."""
 
@@ -113,7 +108,7 @@ def _holds(corners: FloatArray, point: FloatArray) -> bool:
 def listed(vertices: FloatArray, triangles: IntArray, parts: IntArray, scale: float) -> str:
     """The parts in words, sizes in m."""
     texts = []
-    for k in range(min(int(parts.max()) + 1, LISTED)):
+    for k in range(min(int(parts.max()) + 1, 8)):
         mine = triangles[parts == k]
         size = " x ".join(f"{v:.3g}" for v in np.ptp(vertices[mine].reshape(-1, 3), axis=0) * scale)
         texts.append(f"{k + 1}: {len(mine)} triangles, {size} m")
@@ -258,7 +253,8 @@ def taken_apart(name: str, vertices: FloatArray, triangles: IntArray, note: Note
     """
     edges = edges_of(triangles)
     shared = np.flatnonzero(edges.faces > 2)
-    if len(shared) > MOST_SHARED:
+    # with so many it is soup, and left as it is
+    if len(shared) > 100_000:
         return vertices, triangles
     left, right, parted = _joined(vertices, triangles, edges, shared)
     count, label = umbrellas(edges, left, right)
@@ -344,7 +340,7 @@ def uncrossed(
     """
     x, t, cut, share = vertices, triangles, 0, 0.0
     whole = float(areas(x, t).sum())
-    for _ in range(ROUNDS):
+    for _ in range(6):
         count, pairs = crossings(x, t)
         if not count:
             if cut:

@@ -35,20 +35,10 @@ from scatterers.triangles.regions import FEWEST, SHARP
 from scatterers.triangles.topology import cleaned, edges_of, flat_normals, oriented
 
 BAD = 0.03
-ASTRAY = 0.5
-"""|n_6 - n| of a jet that does not follow its triangles; on slivers of smooth bodies it is below 0.2."""
-RESOLVED = 0.3
-"""kappa e that a uniform grid resolves."""
-SLIVER = 0.05
-"""Area, relative to the median, below which the normal of a triangle is not asked."""
-NOISE_RATIO = 0.15
 RESIDUAL_PER_NOISE = 0.95, 0.81
 """Residuals of degree 4 and 6 on noise: sqrt(1 - terms/neighbours), a little more by the weights."""
-JUMP_DECAY = 0.33
 ROUNDING = 1e-12
 """Edges below which a residual is rounding of the vertices."""
-JUMPS_ALONG = 0.5
-"""Jumps, in roots of the number of vertices, that make a curve over the body."""
 
 
 Verdict = Literal["smooth", "noisy", "sharp", "curvature jumps", "too coarse"]
@@ -141,7 +131,7 @@ class MeshQuality:
         rows = [
             ("verdict", self.verdict),
             ("vertices, triangles", f"{self.vertices}, {self.triangles}"),
-            ("size", _metres(self.size)),
+            ("size", " x ".join(f"{v:.4g}" for v in self.size) + " m"),
             ("edge mean, min, max", f"{self.edge_mean:.4g}, {self.edge_min:.4g}, {self.edge_max:.4g} m"),
             ("dihedral 50 %, 99 %, max", f"{d[0]:.3g}, {d[1]:.3g}, {d[2]:.3g} degrees"),
             ("curvature x edge 99 %", f"{self.curvature:.3g}"),
@@ -159,10 +149,6 @@ class MeshQuality:
         return "\n".join([f"{name:26s} {value}" for name, value in rows] + [self.reasons])
 
 
-def _metres(size: FloatArray) -> str:
-    return " x ".join(f"{v:.4g}" for v in size) + " m"
-
-
 def assess(vertices: FloatArray, triangles: IntArray, jets: Jets) -> MeshQuality:
     """Judge a closed, oriented mesh (n, 3), m, and (m, 3) by its jets."""
     corners = vertices[triangles]
@@ -172,7 +158,8 @@ def assess(vertices: FloatArray, triangles: IntArray, jets: Jets) -> MeshQuality
     curvature = np.abs(jets.principal).max(axis=1)
     doubt = _doubt(jets)
     astray = np.linalg.norm(jets.normals - angle_weighted_normals(vertices, triangles), axis=1)
-    badness = np.maximum(np.maximum(jets.tilt, edge * doubt / 3), np.where(astray > ASTRAY, astray, 0.0))
+    # a jet that does not follow its triangles; on slivers of smooth bodies it is off by less than 0.2
+    badness = np.maximum(np.maximum(jets.tilt, edge * doubt / 3), np.where(astray > 0.5, astray, 0.0))
     second, fourth, sixth = np.maximum(jets.residuals, ROUNDING * edge).T
     ratio = sixth / second
     resolved = float(np.percentile(curvature, 99)) * edge
@@ -207,7 +194,7 @@ def jumps_at(jets: Jets, edge: float) -> BoolArray:
     curvature, doubt = np.abs(jets.principal).max(axis=1), _doubt(jets)
     _, fourth, sixth = np.maximum(jets.residuals, ROUNDING * edge).T
     resolved = float(np.percentile(curvature, 99)) * edge
-    jump = (sixth > JUMP_DECAY * fourth) & (sixth > 5 * float(np.median(sixth)))
+    jump = (sixth > 0.33 * fourth) & (sixth > 5 * float(np.median(sixth)))
     strong = float(np.percentile(curvature, 90))
     # noise of s e changes kappa_4 - kappa_6 by up to 8 s/e where the jet is well determined
     jump |= doubt > (0.25 + 100 * resolved**4) * strong + 12 * float(np.median(sixth)) / edge**2
@@ -220,6 +207,8 @@ def _doubt(jets: Jets) -> FloatArray:
 
 def _verdict(quality: dict[str, Any], jets: Jets, *, rims: int, unseen: int) -> tuple[Verdict, str]:
     """Verdict and what it rests on, from the grossest fault to none."""
+    # curvature times edge that a uniform grid resolves
+    resolved = 0.3
     count, badness, jumps = quality["vertices"], quality["badness"], quality["jumps"]
     curvature, noise = quality["curvature"], quality["noise"]
     bad = int(np.sum(badness > BAD))
@@ -231,13 +220,14 @@ def _verdict(quality: dict[str, Any], jets: Jets, *, rims: int, unseen: int) -> 
         )
     if np.mean(~jets.fitted) > 0.5:
         return "too coarse", f"{count} vertices are too few for a smooth surface; give some thousands"
-    if quality["residual_ratio"][0] > NOISE_RATIO and curvature < 1:
+    if quality["residual_ratio"][0] > 0.15 and curvature < 1:
         return "noisy", (
             f"the vertices scatter by about {noise:.2g} of an edge, {noise * quality['edge_mean']:.2g} m, "
             f"which makes curvatures uncertain by some {100 * min(1.0, noise / max(curvature, 1e-3)):.2g} %; smooth "
             "the mesh, or export it with more digits"
         )
-    if JUMPS_ALONG * np.sqrt(count) <= jumps and curvature < RESOLVED:
+    # so many jumps make a curve over the body
+    if 0.5 * np.sqrt(count) <= jumps and curvature < resolved:
         return "curvature jumps", (
             f"the curvature jumps at {jumps} of {count} vertices, as where a cylinder meets a sphere; rays across them "
             "are of low order: blend the faces with continuous curvature"
@@ -247,10 +237,10 @@ def _verdict(quality: dict[str, Any], jets: Jets, *, rims: int, unseen: int) -> 
             f"{unseen} edges are much longer than the neighbourhoods of their ends (longest "
             f"{quality['edge_max']:.3g} m, mean {quality['edge_mean']:.3g} m); mesh the body evenly"
         )
-    if bad or curvature >= RESOLVED:
+    if bad or curvature >= resolved:
         return "too coarse", (
             f"{bad} of {count} vertices are bad ({worst}, allowed {BAD}), curvature times edge is {curvature:.2g}, "
-            f"allowed {RESOLVED}; halve the edges, at least where it curves most"
+            f"allowed {resolved}; halve the edges, at least where it curves most"
         )
     return "smooth", f"no vertex is bad ({worst}, allowed {BAD}) and curvature times edge is {curvature:.2g}"
 
@@ -282,7 +272,8 @@ def _dihedrals(vertices: FloatArray, triangles: IntArray) -> tuple[IntArray, Flo
     left, right = edges.sides.T // 3
     across = np.linalg.norm(np.cross(normal[left], normal[right]), axis=1)
     angle = np.arctan2(across, np.sum(normal[left] * normal[right], axis=1))
-    solid = np.minimum(area[left], area[right]) > SLIVER * np.median(area)
+    # normals of slivers tell nothing
+    solid = np.minimum(area[left], area[right]) > 0.05 * np.median(area)
     return edges.ends[solid], np.degrees(angle[solid])
 
 

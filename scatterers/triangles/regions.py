@@ -1,7 +1,7 @@
 """Smooth regions of a triangle mesh, and the creases between them.
 
-Triangles that lie in one plane (neighbours turned by less than `FLAT`) make facets. An edge of the mesh is a crease if
-its triangles are turned by more than `SHARP` degrees and thrice the median, or by more than `TURN` and `OFTEN` medians
+Triangles in one plane (neighbours turned by less than half a degree) make facets. An edge of the mesh is a crease if
+its triangles are turned by more than `SHARP` degrees and thrice the median, or by more than 12 degrees and 6 medians
 where neither facet is turned about as much against another neighbour: there a round surface is no explanation for it.
 Creases stand in chains: sharp edges that stand alone are those of slivers, and of folds of a coarse mesh. Regions are
 what is connected without crossing a crease.
@@ -16,11 +16,8 @@ from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.body import Crease
 from scatterers.triangles.topology import components, edges_of, flat_normals
 
-FLAT, TURN, SHARP, ALWAYS = 0.5, 12.0, 40.0, 60.0
+SHARP, ALWAYS = 40.0, 60.0
 """Degrees; beyond the last an edge is sharp whatever the others are."""
-OFTEN = 6.0
-ALIKE = 0.4
-"""Turn against another neighbour, relative to that of the edge, from which on a facet is one of a round surface."""
 FEWEST = 6
 """Edges of a chain, unless all are turned by more than `ALWAYS`, as those of a tetrahedron."""
 
@@ -123,7 +120,7 @@ def _piecewise(sides: IntArray, turn: FloatArray, count: int) -> BoolArray:
     """Edges at which no smooth surface goes through the triangles."""
     size = np.abs(turn)
     sharp = ((size > SHARP) & (size > 3 * np.median(size))) | (size > ALWAYS)
-    facet = _connected(count, sides[size < FLAT])
+    facet = _connected(count, sides[size < 0.5])
     # pairs of neighbouring facets, with the turn between them where it may be that of a round surface
     pair = np.sort(facet[sides], axis=1)
     other = (pair[:, 0] != pair[:, 1]) & ~sharp
@@ -141,10 +138,11 @@ def _piecewise(sides: IntArray, turn: FloatArray, count: int) -> BoolArray:
                 first[mine], second[mine], partner[mine] = turn, first[mine], theirs
             elif turn > second[mine] and theirs != partner[mine]:
                 second[mine] = turn
-    mine = np.flatnonzero((size > max(TURN, OFTEN * float(np.median(size)))) & ~sharp)
+    mine = np.flatnonzero((size > max(12.0, 6.0 * float(np.median(size)))) & ~sharp)
     ends = facet[sides[mine]]
     besides = np.where(partner[ends] == ends[:, ::-1], second[ends], first[ends])
-    alone = np.all(besides < ALIKE * size[mine, None], axis=1)
+    # a facet that turns about as much against another neighbour is one of a round surface
+    alone = np.all(besides < 0.4 * size[mine, None], axis=1)
     sharp[mine[alone]] = True
     return np.asarray(sharp)
 

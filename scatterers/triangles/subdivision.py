@@ -27,8 +27,6 @@ from scatterers.triangles.topology import edges_of
 Note = Callable[[str], None]
 BLIND = 1.5
 """kappa_n(e) e beyond which a mesh shows nothing of the curvature, radians."""
-MOST_SUBDIVIDED, MOST = 60_000, 300_000
-"""Vertices beyond which "auto" does not subdivide a mesh, and beyond which nothing is subdivided."""
 
 
 class Source(NamedTuple):
@@ -69,13 +67,13 @@ def subdivided(vertices: FloatArray, triangles: IntArray, times: int, note: Note
     Raises
     ------
     ValueError
-        If it would have more than `MOST` vertices.
+        If it would have more than 300 000 vertices.
     """
     import trimesh
 
-    if len(vertices) * 4**times > MOST:
+    if len(vertices) * 4**times > 300_000:
         raise ValueError(
-            f"subdivide = {times} makes {len(vertices) * 4**times} vertices of {len(vertices)}, more than {MOST}; "
+            f"subdivide = {times} makes {len(vertices) * 4**times} vertices of {len(vertices)}, more than 300000; "
             + ("subdivide fewer times" if times > 1 else "take the mesh as it is")
         )
 
@@ -109,7 +107,9 @@ def edges_where_curved(vertices: FloatArray, triangles: IntArray, curvature: Flo
     ends = edges_of(triangles).ends
     known = np.where(np.isfinite(curvature), curvature, 0.0)
     weight = (known / known.max()) ** 4 if known.max() > 0 else np.ones(len(vertices))
-    return float(np.average(_mean_edges(vertices, ends), weights=weight))
+    length = np.linalg.norm(vertices[ends[:, 0]] - vertices[ends[:, 1]], axis=1)
+    total = sum(np.bincount(end, length, minlength=len(vertices)) for end in ends.T)
+    return float(np.average(total / np.bincount(ends.ravel(), minlength=len(vertices)), weights=weight))
 
 
 def turns(source: Source, along: Callable[[FloatArray, FloatArray], FloatArray]) -> FloatArray:
@@ -128,21 +128,9 @@ def unseen(source: Source, turn: FloatArray, principal: FloatArray, gauss: Float
     Vertices at which it shows nothing at all are left out.
     """
     values = np.column_stack([principal, gauss])
-    left = np.maximum(1.0, turn**2)[:, None] * (values - _mean_of_neighbours(values, source.edges))
+    first, last = np.concatenate([source.edges, source.edges[:, ::-1]]).T
+    total = np.stack([np.bincount(first, one[last], minlength=len(values)) for one in values.T], axis=1)
+    of_neighbours = total / np.bincount(first, minlength=len(values))[:, None]
+    left = np.maximum(1.0, turn**2)[:, None] * (values - of_neighbours)
     left = left[turn <= BLIND]
     return float(np.sqrt(np.mean(left[:, :2] ** 2))), float(np.sqrt(np.mean(left[:, 2] ** 2)))
-
-
-def _mean_of_neighbours(values: FloatArray, edges: IntArray) -> FloatArray:
-    """Mean over the neighbours of each vertex, (n, c) -> (n, c)."""
-    first, last = np.concatenate([edges, edges[:, ::-1]]).T
-    count = np.bincount(first, minlength=len(values))
-    total = np.stack([np.bincount(first, one[last], minlength=len(values)) for one in values.T], axis=1)
-    return np.asarray(total / count[:, None])
-
-
-def _mean_edges(vertices: FloatArray, edges: IntArray) -> FloatArray:
-    """Mean length of the edges at each vertex, (n,), L."""
-    length = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
-    total = sum(np.bincount(end, length, minlength=len(vertices)) for end in edges.T)
-    return np.asarray(total / np.bincount(edges.ravel(), minlength=len(vertices)))

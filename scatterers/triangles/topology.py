@@ -21,10 +21,6 @@ import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 
-CLOSE = (1e-6, 1e-5, 1e-4)
-"""Distance of vertices on open edges that are merged, in diagonals of the body: single precision, and a few digits."""
-FLAT = 1e-9
-"""Volume over that of the cube of the diagonal, below which a mesh encloses nothing."""
 KEPT = 1000
 """Pairs that are returned at most."""
 
@@ -127,7 +123,8 @@ def _proper(name: str, triangles: IntArray, note: Note) -> IntArray:
 
 def _close_gaps(name: str, vertices: FloatArray, triangles: IntArray, note: Note) -> tuple[FloatArray, IntArray]:
     """Merge vertices of open edges that differ by rounding, more of it while edges stay open; drop what is not used."""
-    for close in CLOSE:
+    # in diagonals of the body: single precision, and a few digits
+    for close in (1e-6, 1e-5, 1e-4):
         edges = edges_of(triangles)
         border = np.unique(edges.ends[edges.faces == 1])
         if not len(border):
@@ -177,7 +174,7 @@ def oriented(name: str, vertices: FloatArray, triangles: IntArray, note: Note) -
         wrong = min(int(turned.sum()), len(triangles) - int(turned.sum()))
     a, b, c = np.moveaxis(vertices[triangles], 1, 0)
     volume = float(np.sum(a * np.cross(b, c))) / 6
-    if not abs(volume) > FLAT * float(np.linalg.norm(np.ptp(vertices, axis=0))) ** 3:
+    if not abs(volume) > 1e-9 * float(np.linalg.norm(np.ptp(vertices, axis=0))) ** 3:
         raise ValueError(f"{name} encloses no volume; give a body, not a sheet")
     if not agree.all():
         note(f"{wrong} of {len(triangles)} triangles of {name} faced the other way than their neighbours; turned")

@@ -10,15 +10,10 @@ Sources: Derivations, R6, R8 and R19.
 
 import math
 
-import numpy as np
 from numba import njit
 
 from creeping.kernels.block import BLOCK, aligned
 from creeping.kernels.block import strict_options as options
-
-ROUNDING = float(np.finfo(float).eps)
-ROWS = 23
-"""Of work space: points, F and its derivatives there, waves, and what `_step` gives."""
 
 
 @njit(**options)
@@ -26,7 +21,7 @@ def move(level, level_par, waves, x, reach, steps, work, tangents, curvature, le
     """Move x (n, 3) onto the lines of waves (n, 4), or (1, 4) of one for all, by so many steps of at most ``reach``.
 
     Fills, where the points are in the end, T (n, 3), kappa_n (n,) and the sizes (n,) of the steps that would follow,
-    none of them finite where there is no step. Returns the largest size, inf if one is not finite. work (ROWS, BLOCK)
+    none of them finite where there is no step. Returns the largest size, inf if one is not finite. work (23, BLOCK)
     is work space.
     """
     points, values, q, out = work[:3], work[3:13], work[13:17], work[17:23]
@@ -73,7 +68,7 @@ def _step(x, g, wave, out, reach, on):
         sy = -(F * (hz * wx - hx * wz) + G * (wz * gx - wx * gz)) * inverse
         sz = -(F * (hx * wy - hy * wx) + G * (wx * gy - wy * gx)) * inverse
         size = math.sqrt(sx * sx + sy * sy + sz * sz)
-        least = ROUNDING * (abs(x[i]) + abs(x[BLOCK + i]) + abs(x[2 * BLOCK + i]))
+        least = 2.0**-52 * (abs(x[i]) + abs(x[BLOCK + i]) + abs(x[2 * BLOCK + i]))
         part = 1.0 if size < reach else reach / size
         # a size that is no number is no small one
         part = 0.0 if size <= least else part * taken
@@ -94,4 +89,4 @@ def _step(x, g, wave, out, reach, on):
 @njit("float64[:, ::1]()", **options)
 def work_space():
     """Work space of `move`."""
-    return aligned(ROWS, BLOCK)
+    return aligned(23, BLOCK)

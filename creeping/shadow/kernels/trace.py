@@ -24,23 +24,17 @@ CURVES = 16
 """Curves of a line at most."""
 LEAST_NODES = 64
 """Nodes of a curve at least; their number is a multiple of 8."""
-APART = 0.45
-"""Least distance of neighbouring crossings, in edges."""
-COARSE_STEP = 0.22
-"""Second step of the crossings, in edges, from which a line is flagged: they may have changed branch."""
-REACH, MORE = 0.5, 4
-"""Longest step of a node, in edges: next to a small loop a longer one would end on another branch. And steps more that
-a flagged line takes."""
-LOST, UNSETTLED = 1e-3, 1e-6
-"""Second step of the nodes, in extents, at which a line is given up, and at which it goes to the next mesh."""
-SETTLED, PRECISE = 2e-6, 1e-7
-"""Relative difference of its length by orders 4 and 6, and by 8 and 12, at which a line goes to the next mesh."""
 
 _AROUND = 6
-_TWELVE = np.array([548839986, -91373082, 27022635, -6409423, 995469, -73985]) / 958003200
-_EIGHT = np.array([68323, -9531, 1879, -191, 0, 0]) / 120960
-_SIX = np.array([802, -93, 11, 0, 0, 0]) / 1440
-_FOUR = np.array([13, -1, 0, 0, 0, 0]) / 24
+_MEANS = np.array(
+    [
+        np.array([548839986, -91373082, 27022635, -6409423, 995469, -73985]) / 958003200,
+        np.array([68323, -9531, 1879, -191, 0, 0]) / 120960,
+        np.array([802, -93, 11, 0, 0, 0]) / 1440,
+        np.array([13, -1, 0, 0, 0, 0]) / 24,
+    ]
+)
+"""a_j of orders 12, 8, 6 and 4."""
 
 
 @njit(**options)
@@ -73,7 +67,8 @@ def lines_on_mesh(
     raw, slopes, bent, left, h = np.empty((cap, 3)), np.empty((cap, 3)), np.empty(cap), np.empty(most), np.empty(most)
     first, lengths, padded = np.empty(CURVES + 1, np.int64), np.empty(CURVES), np.empty((3, most + 2 * _AROUND))
     # a number of steps that is no constant, for which `move` would be compiled once more
-    reach, once = REACH * edge, np.int64(1)
+    # next to a small loop a node with a longer step, in edges, would end on another branch
+    reach, once = 0.5 * edge, np.int64(1)
     for row in range(waves.shape[0]):
         found[row] = 0
         wave, y, T, kappa, begin = waves[row : row + 1], x[row], tangents[row], curvature[row], starts[row]
@@ -82,8 +77,9 @@ def lines_on_mesh(
             continue
         some = first[curves]
         step = move(level, level_par, wave, raw[:some], reach, once, space, slopes, bent, left)
-        sure = step < COARSE_STEP * edge
-        more = once if sure else MORE * once
+        # crossings that go farther, in edges, may have changed branch: the line takes more steps, and is flagged
+        sure = step < 0.22 * edge
+        more = once if sure else 4 * once
         if not move(level, level_par, wave, raw[:some], reach, more, space, slopes, bent, left) < math.inf:
             continue
         leans, whole = _lengths(raw, slopes, first, curves, h, lengths)
@@ -93,19 +89,21 @@ def lines_on_mesh(
         good, off, rough = end > 0, 0.0, 0.0
         for again in range(2):
             step = move(level, level_par, wave, y[:end], reach, once, space, T, kappa, left) if good else math.inf
-            sure &= step < UNSETTLED * extent
-            good &= step < LOST * extent
+            # by the second step of the nodes, in extents, a line goes to the next mesh, or is given up
+            sure &= step < 1e-6 * extent
+            good &= step < 1e-3 * extent
             if good:
                 whole, off, rough = _spaced(y, T, begin, curves, padded, h, spacing[row], again == 0)
                 good = whole < math.inf
         if good:
             found[row], error[row] = curves, off / whole
-            certain[row] = sure and not leans and rough < SETTLED * whole and off < PRECISE * whole
+            # its length differs so little by orders 4 and 6, and by 8 and 12
+            certain[row] = sure and not leans and rough < 2e-6 * whole and off < 1e-7 * whole
 
 
 @njit(**options)
 def _walk(mesh, wave, s, marks, number, crossings, first):
-    """Crossings of mesh edges, curve by curve, APART at least; returns the number of curves, -1 if they are too many.
+    """Crossings of mesh edges, curve by curve, 0.45 edges apart at least; returns the number of curves, -1 of too many.
 
     s (vertices,) is left with n.q, ``marks`` (triangles,) hold the number of the line that passed last.
     """
@@ -114,7 +112,7 @@ def _walk(mesh, wave, s, marks, number, crossings, first):
     nx, ny, nz, x, y, z = normals[0], normals[1], normals[2], vertices[0], vertices[1], vertices[2]
     for i in range(s.shape[0]):
         s[i] = nx[i] * (a + w * x[i]) + ny[i] * (b + w * y[i]) + nz[i] * (c + w * z[i])
-    total, curves, least = np.int64(0), 0, (APART * edge) ** 2
+    total, curves, least = np.int64(0), 0, (0.45 * edge) ** 2
     first[0] = 0
     for begin in range(triangles.shape[0]):
         lit = (s[triangles[begin, 0]] < 0.0) + (s[triangles[begin, 1]] < 0.0) + (s[triangles[begin, 2]] < 0.0)
@@ -226,10 +224,10 @@ def _spaced(x, tangents, starts, curves, padded, h, spacing, shift):
                 twelve = eight = six = four = 0.0
                 for a in range(_AROUND):
                     pair = padded[k, m + _AROUND - a] + padded[k, m + _AROUND + 1 + a]
-                    twelve += _TWELVE[a] * pair
-                    eight += _EIGHT[a] * pair
-                    six += _SIX[a] * pair
-                    four += _FOUR[a] * pair
+                    twelve += _MEANS[0, a] * pair
+                    eight += _MEANS[1, a] * pair
+                    six += _MEANS[2, a] * pair
+                    four += _MEANS[3, a] * pair
                 square += (x[j, k] - x[begin + m, k]) ** 2
                 twelfth += twelve * twelve
                 eighth += eight * eight
