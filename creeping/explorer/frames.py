@@ -20,10 +20,9 @@ import numpy as np
 from creeping._typing import ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError
 from creeping.explorer.request import ViewRequest
-from creeping.field.body_currents import cached_currents
+from creeping.field.body_currents import cached_currents, has_expansions
 from creeping.field.far import far_field
 from creeping.field.on_rays import ray_envelope
-from creeping.field.problem import has_expansions
 from creeping.field.results.comparison import decibels
 from creeping.field.results.far_result import FarField
 from creeping.field.routes import affordable

@@ -11,7 +11,7 @@ import numpy as np
 
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.creeping_modes import fock_scale
+from creeping.field.boundary import fock_scale
 from creeping.geometry.arguments import positive_number, real_array, shown
 from creeping.geometry.checks import unit_of
 from creeping.geometry.directions import unit_directions
@@ -20,7 +20,6 @@ from creeping.geometry.piecewise import checked_smooth, has_edges
 from creeping.geometry.surface import Surface
 from creeping.rays.quantities import RayPoints
 
-LEAST_WAVENUMBER, LARGEST_WAVENUMBER = 1e-100, 1e100
 ACROSS = (3e-4, 1e6)
 """Wavelengths across of bodies that have a field. Below, the equation loses it: f of a sphere is within 1.1 % at 3e-4,
 and 100, 20 and 33 % off at 3e-5, soft, rigid and conducting. Above, 1e-6 of the size is a wavelength: rays err so."""
@@ -107,7 +106,7 @@ def checked(wavenumber: float, order: int, body: Surface | None = None) -> float
             "creeping.backscatter, creeping.sweep_directions, creeping.t_matrices or creeping.orientation_averages"
         )
     k = positive_number(wavenumber, "wavenumber")
-    if not LEAST_WAVENUMBER <= k <= LARGEST_WAVENUMBER:
+    if not 1e-100 <= k <= 1e100:
         raise InvalidInputError(f"wavenumber = {k:g} has squares that are no numbers; take another unit of length")
     if isinstance(order, bool) or not isinstance(order, int | np.integer) or order not in (1, 2):
         raise InvalidInputError(f"order = {order!r} is neither 1 nor 2")

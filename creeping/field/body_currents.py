@@ -20,20 +20,14 @@ from creeping.field.currents.radiation import self_reflects
 from creeping.field.currents.whole_body import SurfaceCurrents
 from creeping.field.equation import solving
 from creeping.field.equation.solving import Solved, asked_solution, solution_for
-from creeping.field.problem import has_expansions
 from creeping.geometry.arguments import one_of
-from creeping.geometry.piecewise import is_piecewise
-from creeping.geometry.surface import memo_of, size
+from creeping.geometry.piecewise import has_edges, is_piecewise
+from creeping.geometry.surface import Surface, memo_of, size
 from creeping.rays.fan import RayFan
 from creeping.shadow.line import ShadowLine
 
 CUT = 1e-3
 """Share of the shadow line without rays from which the lit side is not that of a convex body."""
-POOR = 0.01
-"""What currents leave of the incident wave inside from which the equation of any body is solved: next to the body they
-err by ten times that."""
-KEPT = 2
-"""Currents kept with a fan, of so many wavenumbers and boundaries."""
 
 
 def surface_currents(
@@ -101,7 +95,8 @@ def surface_currents(
         if not found:
             raise
         return _of_line(fan, found)
-    poor = facing or currents.unserved > CUT or currents.stepped > 0 or not currents.extinction <= POOR
+    # next to the body currents err by ten times what they leave inside
+    poor = facing or currents.unserved > CUT or currents.stepped > 0 or not currents.extinction <= 0.01
     found = solution_for(*problem) if solve is None and poor else None
     # both are measured the same way; what expansions leave is not known where the body is too thin for points inside
     if found and not found.currents.extinction > currents.extinction:
@@ -186,4 +181,9 @@ def cached_currents(
     def make() -> SurfaceCurrents:
         return surface_currents(fan, wavenumber=wavenumber, boundary=boundary, solve=solve)
 
-    return memo_of(fan, "currents", (wavenumber, boundary, solve), make, KEPT)
+    return memo_of(fan, "currents", (wavenumber, boundary, solve), make, 2)
+
+
+def has_expansions(body: Surface, boundary: BoundaryLike) -> bool:
+    """Whether there are expansions of currents on all of a body: not round edges, nor across joints of a conductor."""
+    return not has_edges(body) and not (boundary == "pec" and is_piecewise(body))

@@ -36,14 +36,8 @@ if TYPE_CHECKING:
 INSIDE = -1
 """Status on the grid where there is no field."""
 
-FINE, COARSE = 8, 5
-"""Points a wavelength where no step is given; the fewer where more would cost too much."""
 ENOUGH, MOST = 60_000, 400_000
 """Points of a cut that is given no step, and of any."""
-AROUND = 0.75
-"""Room beside the body of a cut that is given no extent, in the body's longest side."""
-ALONG = np.cos(np.radians(30.0))
-"""Cosine from which an axis counts as along a direction, and spans no plane with it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -412,7 +406,8 @@ def _axes(direction: FloatArray, across: ArrayLike | None, up: ArrayLike | None,
     """Unit vectors of a plane (2, 3)."""
     one = np.asarray(direction if across is None else unit_direction(across))
     if up is None:
-        along = np.abs(one) > ALONG
+        # within 30 degrees of it an axis spans no plane with a direction
+        along = np.abs(one) > np.cos(np.radians(30.0))
         other = np.eye(3)[np.argmax(np.where(along, -1.0, box))]
     else:
         other = np.asarray(unit_direction(up))
@@ -426,7 +421,8 @@ def _sides(extent: ArrayLike | None, axes: FloatArray, box: FloatArray) -> Float
     """Width and height of the rectangle (2,), L."""
     if extent is None:
         edges = box[1] - box[0]
-        return np.asarray(np.abs(axes) @ edges + 2 * AROUND * float(edges.max()))
+        # three quarters of its longest side beside the body
+        return np.asarray(np.abs(axes) @ edges + 1.5 * float(edges.max()))
     sides = real_array(extent, "extent")
     if sides.shape != (2,) or not (np.all(np.isfinite(sides)) and np.all(sides > 0)):
         raise InvalidInputError(f"extent = {extent!r}: give a width and a height, positive and finite")
@@ -455,9 +451,10 @@ def _spacing(sides: FloatArray, step: float | None, k: float, enough: Callable[[
             )
         return number_between(given, "step", 0.0, float(np.min(sides)))
     wavelength = 2 * np.pi / k
-    spacing = wavelength / FINE
-    while spacing < wavelength / COARSE and not enough(spacing):
-        spacing = min(1.1 * spacing, wavelength / COARSE)
+    # eight points a wavelength; down to five where more would cost too much
+    spacing = wavelength / 8
+    while spacing < wavelength / 5 and not enough(spacing):
+        spacing = min(1.1 * spacing, wavelength / 5)
     if _count(sides, spacing) > ENOUGH:
         spacing = float(np.sqrt(np.prod(sides) / ENOUGH)) * 1.01
     # a few points even where the wave is longer than the rectangle

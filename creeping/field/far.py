@@ -37,9 +37,8 @@ from creeping.field.arguments import checked, checked_method, checked_plain, obs
 from creeping.field.body_currents import surface_currents
 from creeping.field.boundary import BoundaryLike, scalar_boundaries
 from creeping.field.currents.whole_body import far_by_currents
-from creeping.field.problem import Problem
 from creeping.field.results.far_result import FarField
-from creeping.field.routes import TRUST, expected_nodes, far_currents
+from creeping.field.routes import TRUST, Problem, expected_nodes, far_currents
 from creeping.field.validity_range import validity
 from creeping.field.waves.far_geometry import far_geometry
 from creeping.field.waves.far_rays import field_of

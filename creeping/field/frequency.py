@@ -24,29 +24,16 @@ from creeping._typing import ArrayLike, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.storage.memory import within_budget
 
-LIGHT = 299_792_458.0
-"""Speed of light in a vacuum, m/s."""
-SLOWEST = 10.0
-"""Of sound, m/s: in water that is half air, of 1 bar, it travels at 24 by Wood's formula; little is slower."""
 HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "ghz": 1e9, "thz": 1e12}
 """Units of frequency by their names in small letters, 1/s."""
 METRES = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9}
 """Units of wavelength, m."""
+
 UNITS = ((1e9, "GHz"), (1e6, "MHz"), (1e3, "kHz"), (1.0, "Hz"))
 """Units in which frequencies are shown, the largest first."""
-MOST = 100_000
-"""Frequencies of one range."""
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-
 WINDOWS = ("hann", "none", "taylor")
 PADDING = 8
 """Samples for each one that the band resolves."""
-LEAST = 8
-"""Wavenumbers of a band."""
-POINT_BYTES, VALUE_BYTES = 1600.0, 80.0 * PADDING
-"""Of a wavenumber, mostly for the width of the window's transform, and of a value at it, padded."""
-EQUAL = 1e-4
-"""How far spacings of the wavenumbers may differ from their mean, as a share of it."""
 
 
 def wavenumber(value: str | ArrayLike, *, sound_speed: float | None = None) -> float | FloatArray:
@@ -130,11 +117,13 @@ def suited(value: float, units: tuple[tuple[float, str], ...] = UNITS) -> tuple[
 
 def _speed(sound_speed: float | None) -> float:
     if sound_speed is None:
-        return LIGHT
+        # of light in a vacuum, m/s
+        return 299_792_458.0
     if np.ndim(sound_speed) or isinstance(sound_speed, (str, bool)):
         raise InvalidInputError(f"sound_speed = {sound_speed!r} is no number of m/s")
     speed = float(_positive(sound_speed, "sound_speed"))
-    if speed < SLOWEST:
+    # in water that is half air, of 1 bar, sound travels at 24 by Wood's formula; little is slower
+    if speed < 10:
         raise InvalidInputError(
             f"sound_speed = {speed:g} m/s is slower than sound in any medium; of {speed:g} km/s give {1000 * speed:g}"
         )
@@ -157,7 +146,8 @@ def _positive(value: ArrayLike, what: str) -> FloatArray:
 
 def _parsed(text: str) -> tuple[FloatArray, float, bool]:
     """Numbers (n,) of a text, their unit in Hz or m, and whether it is a length."""
-    parts = [re.fullmatch(rf"\s*({_NUMBER})\s*([^\W\d]*)\s*", part) for part in text.split(":")]
+    number = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+    parts = [re.fullmatch(rf"\s*({number})\s*([^\W\d]*)\s*", part) for part in text.split(":")]
     known = f"units are {', '.join(['Hz', 'kHz', 'MHz', 'GHz', 'THz', *METRES])}"
     found = [(float(part[1]), part[2]) for part in parts if part]
     if len(found) < len(parts) or len(parts) not in (1, 3):
@@ -186,8 +176,8 @@ def _parsed(text: str) -> tuple[FloatArray, float, bool]:
         raise InvalidInputError(f"{text!r} is no range: give first:last:step, positive, the first not above the last")
     if first < last < first + step * (1 - 1e-9):
         raise InvalidInputError(f"{text!r} has a step longer than the band; give one of {last - first:g} or less")
-    if not (last - first) / step < MOST:
-        raise InvalidInputError(f"{text!r} has {(last - first) / step + 1:.3g} values; {MOST} are the most")
+    if not (last - first) / step < 100_000:
+        raise InvalidInputError(f"{text!r} has {(last - first) / step + 1:.3g} values; 100000 are the most")
     values = first + step * np.arange(int((last - first) / step + 1e-9) + 1)
     return np.asarray(values, dtype=float), scale, of_length.pop()
 
@@ -213,7 +203,7 @@ def band_sum(
         or there is no such window.
     """
     k = np.asarray(wavenumbers, dtype=float)
-    if k.ndim != 1 or values.shape[:1] != k.shape or len(k) < LEAST:
+    if k.ndim != 1 or values.shape[:1] != k.shape or len(k) < 8:
         raise InvalidInputError(
             f"{what} takes eight or more values at as many wavenumbers, not {values.shape} and {k.shape}"
         )
@@ -222,15 +212,12 @@ def band_sum(
         raise InvalidInputError(
             f"{what} takes finite values; {int(bad.sum())} of {bad.size} are not: leave out those that are not resolved"
         )
-    within_budget(
-        len(k) * (POINT_BYTES + VALUE_BYTES * (values.size // len(k))),
-        f"{what} of {values.size} values",
-        "give fewer",
-        asked=values.size,
-    )
+    # of a wavenumber, mostly for the width of the window's transform, and of a value at it, padded
+    needed = len(k) * (1600.0 + 80.0 * PADDING * (values.size // len(k)))
+    within_budget(needed, f"{what} of {values.size} values", "give fewer", asked=values.size)
     steps = np.diff(k)
     step = float(np.mean(steps))
-    if not (step > 0 and np.max(np.abs(steps - step)) <= EQUAL * step):
+    if not (step > 0 and np.max(np.abs(steps - step)) <= 1e-4 * step):
         raise InvalidInputError(f"{what} takes ascending, equally spaced wavenumbers")
     weights = _window(window, len(k))
     weights = weights / weights.sum()

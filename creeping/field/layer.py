@@ -1,6 +1,7 @@
 """The total field nearer to the body than currents serve: between the field on it and that of currents above.
 
-Along the normal at x, h above the body, t = kh and c = -n.d, at least 0.15, each component is
+Along the normal at x, h above the body, t = kh and c = -n.d, at least 0.15, below which the four terms are powers of t
+to rounding, each component is
 
     a cos ct + b sin(ct)/c + a' t sin(ct)/c + b' 3 (sin ct - ct cos ct)/c^3
 
@@ -15,8 +16,9 @@ of four values that are known, of u (in units of the incident wave) or of E and 
 Incident and reflected wave of a plane are a and b; where the wave grazes the four are 1, t, t^2 and t^3. Each weight of
 a value is 1 at most. The slopes of E and H are div E = 0, (curl H)_t = 0 and div H = 0 on the body, where E_t = 0 and
 H_n = 0; curl E = ikH gives a slope of E_t by the gradient of the charge, which is not known well enough. What four
-terms leave out is about A |kappa_1 + kappa_2|/k of the incident wave; on a saddle the root of kappa_1^2 + kappa_2^2
-stands for the sum.
+terms leave out is about 0.1 |kappa_1 + kappa_2|/k of the incident wave, 0.03 of an impedance and 0.3 of E_t, of a
+conductor as the cube of the heights that the terms span; on a saddle the root of kappa_1^2 + kappa_2^2 stands for the
+sum.
 
 Sources: [CK13, sec. 6.2]; Derivations, F8, F20 and F26.
 """
@@ -29,27 +31,15 @@ from creeping._typing import ArrayLike, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
 from creeping.field.currents.whole_body import SurfaceCurrents, far_enough
 from creeping.field.on_body import OnBody, field_on_body
-from creeping.field.problem import Problem
 from creeping.field.results.conductor_result import E, H
 from creeping.field.results.point_result import FieldStatus, PointValues, columns_of, measured_field
+from creeping.field.routes import Problem
 from creeping.geometry.quadrature import SYMMETRIC, BodyNodes, body_nodes, nearest_points
 from creeping.geometry.surface import Surface, size
 from creeping.shadow.attachment import occluded
 
-LOWEST, APART = 0.27, 0.27
+LOWEST = 0.27
 """Least height, in wavelengths, at which currents are asked, and that of further points above it."""
-SPACED = 2.6
-"""The same of a conductor in terms of half the distance between nodes: E of a sum over nodes falls off like
-e^(-2 pi h/distance)."""
-CLEAR = 0.2 / 0.27, 0.8
-"""Share of the least height, of a scalar field and of a conductor's, that nodes must tell of it: they are too far apart
-to tell more."""
-GRAZING = 0.15
-"""Least c: below, the four terms are powers of t to rounding."""
-LEFT_OUT = {"soft": 0.1, "hard": 0.1, "impedance": 0.03, "conductor": 0.1}
-"""A; of a conductor as the cube of the heights that the terms span."""
-LEFT_OUT_ACROSS = 0.3
-"""A of E_t."""
 FOOT = 1e-6
 """Distance, in body sizes, up to which a point is above its foot."""
 
@@ -63,10 +53,11 @@ def heights_of(problem: Problem) -> tuple[float, ...]:
         If the wavenumber is too high for any mesh of the body.
     """
     if not problem.vector:
-        return LOWEST, LOWEST + APART
+        return LOWEST, 2 * LOWEST
     nodes = body_nodes(problem.body, 2 * problem.wavenumber)
-    low = max(LOWEST, SPACED * nodes.spacing / 2 * problem.wavenumber / (2 * np.pi))
-    return low, low + APART, low + 2 * APART
+    # E of a sum over nodes falls off like e^(-2 pi h/distance)
+    low = max(LOWEST, 1.3 * nodes.spacing * problem.wavenumber / (2 * np.pi))
+    return low, low + LOWEST, low + 2 * LOWEST
 
 
 def layer_fields(problem: Problem, currents: SurfaceCurrents, points: FloatArray) -> tuple[IntArray, list[PointValues]]:
@@ -75,11 +66,13 @@ def layer_fields(problem: Problem, currents: SurfaceCurrents, points: FloatArray
     Without the field on the body there is none above it.
     """
     body, k, d, heights = problem.body, problem.wavenumber, problem.direction, heights_of(problem)
-    at, nodes, height, tops = feet_of(body, points, k, heights, CLEAR[problem.vector] * heights[0])
+    # of their distance from the body nodes, too far apart, must tell so much
+    clear = 0.8 * heights[0] if problem.vector else 0.2
+    at, nodes, height, tops = feet_of(body, points, k, heights, clear)
     surface = field_on_body(problem, nodes.points, currents)
     above = [currents.total(top, occluded(body, top, d)) for top in tops]
     # waves behind the body run along it
-    c, t = np.maximum(-nodes.normals @ d, GRAZING), k * height
+    c, t = np.maximum(-nodes.normals @ d, 0.15), k * height
     columns = []
     for i, one in enumerate(surface.columns):
         values, errors = ([columns_of(part)[i] for part in each] for each in zip(*above, strict=True))
@@ -112,9 +105,9 @@ def _scalars(
         known, its = [nothing, on / k], [np.abs(nothing), off / k]
     else:
         known, its = [on, np.asarray(-1j * kind.admittance * on)], [off, np.abs(kind.admittance) * off]
-    w, _ = _weights(c, t, (LOWEST, LOWEST + APART))
+    w, _ = _weights(c, t, (LOWEST, 2 * LOWEST))
     each = [w[:, i] * one for i, one in enumerate([*its, *errors])]
-    error = np.linalg.norm([*each, LEFT_OUT[kind.kind] * nodes.bending / k], axis=0)
+    error = np.linalg.norm([*each, (0.03 if kind.kind == "impedance" else 0.1) * nodes.bending / k], axis=0)
     return np.sum(w * np.stack([*known, *tops], axis=1), axis=1), error
 
 
@@ -150,9 +143,9 @@ def _vectors(
     shared = [w[:, 2] * errors[0], w[:, 3] * errors[1]]
     of_charge = (w[:, 0] - w[:, 1] * total) * surface.charge_error[:, i]
     across = [v[:, j + 1] * error for j, error in enumerate(errors)]
-    plain = LEFT_OUT["conductor"] * left_out
+    plain = 0.1 * left_out
     of_H = np.linalg.norm([*shared, w[:, 0] * off, w[:, 1] * off, plain], axis=0)
-    of_E = np.linalg.norm([*shared, *across, of_charge, plain, LEFT_OUT_ACROSS * left_out], axis=0)
+    of_E = np.linalg.norm([*shared, *across, of_charge, plain, 0.3 * left_out], axis=0)
     return field, np.maximum(of_E, of_H)
 
 

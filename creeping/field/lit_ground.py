@@ -3,7 +3,7 @@
 The error of the lit side, as a share of u1 and with u2 of second order, is
 
     [(A |u2/u1 - 1|^2)^2 + (B/(m^4 (1 + G xi^2)))^2 + (C (|rho rho''| + rho'^2)/m^2)^2 + (D r^2/m^4)^2 + E^2]^(1/2)
-    E = F max(0, 1 - 2 max(kappa_a, 0) a)/(k a max(c, 1/m_a)^3),   m_a = (ka/2)^(1/3)
+    E = 0.7 max(0, 1 - 2 max(kappa_a, 0) a)/(k a max(c, 1/m_a)^3),   m_a = (ka/2)^(1/3)
 
 r is kappa_b/kappa_a, of a conductor its root. E is for ground that is flat by the measure of the body's size a: the
 second order kappa_a/(2kc^3) of optics knows nothing there of the curvature at its end, which on a closed body is 1/a in
@@ -12,7 +12,7 @@ from elsewhere on the body are known, and what currents leave inside (`creeping.
 large the others are; where that cannot be measured the error is a bound.
 
 Sources: [F46], [LK59]; Derivations, F16 and F20. The factors were set on four bodies
-(`studies.accuracy.point_coverage`), F on x^4 + y^4 + z^4 = 1 at k = 8 and 14.
+(`studies.accuracy.point_coverage`), that of E on x^4 + y^4 + z^4 = 1 at k = 8 and 14.
 """
 
 from dataclasses import replace
@@ -21,8 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
-from creeping.field.boundary import Boundary
-from creeping.field.creeping_modes import fock_scale
+from creeping.field.boundary import Boundary, fock_scale
 from creeping.field.currents.nodes import LitNodes
 from creeping.field.currents.radiation import may_self_reflect
 from creeping.field.results.point_result import FieldStatus, PointValues, Words
@@ -60,18 +59,9 @@ FACTORS = {
     "impedance": LitFactors(0.6, 0.05, 0.06, 0.15, 0.0, 2.0),
     "conductor": LitFactors(2.0, 0.25, 0.05, 0.3, 1.0, 2.5),
 }
-COATED = 1.5
-"""By how much more an admittance that varies is off."""
-FLAT, ENDS = 2.0, 0.7
-"""1/(kappa_a a) from which ground is flat, and factor F of what the curvature at its end is worth."""
 LEFT, UNKNOWN = 2.0, 2.0
 """Factor of what currents leave inside, of waves that come to the lit side from elsewhere; and their bound, a
 reflected wave and its image."""
-WELL_KNOWN = 0.04
-"""What currents of a conductor leave at most where that tells of the dark side; beyond, the factor grows with it."""
-
-NO_VALUE = 1e30
-"""Size from which a value is that of a tip."""
 
 
 def convex(fan: RayFan) -> bool:
@@ -106,7 +96,8 @@ def composed(
     afar, dark = FACTORS[kind.kind].afar, 1 - share
     if kind.kind == "conductor":
         # such waves come to the penumbra as they do beyond it
-        afar, dark = afar * max(1.0, left / WELL_KNOWN), np.where(share < 1, 1.0, 0.0)
+        # what is left inside tells of the dark side up to 0.04, beyond the factor grows with it
+        afar, dark = afar * max(1.0, left / 0.04), np.where(share < 1, 1.0, 0.0)
     lit_off = np.hypot(lit_off, (by == "march") * dark * unit * afar * left if np.isfinite(left) else 0.0)
     creeping, error, status = rays.values, rays.error, rays.status
     bare = (status != FieldStatus.OK) & (error == 0)
@@ -134,7 +125,7 @@ def composed(
 def without_tips(field: PointValues) -> PointValues:
     """The field without values where curvature is infinite, as on a tip: 0, without a bound, UNRESOLVED."""
     values = field.values.reshape(len(field.error), -1)
-    bad = ~(np.all(np.isfinite(values) & (np.abs(values) < NO_VALUE), axis=1) & np.isfinite(field.error))
+    bad = ~(np.all(np.isfinite(values) & (np.abs(values) < 1e30), axis=1) & np.isfinite(field.error))
     if not np.any(bad):
         return field
     each = bad.reshape(-1, *(1,) * (field.values.ndim - 1))
@@ -166,12 +157,13 @@ def lit_error(
             of.across * across * (m**-2 if kind.kind == "conductor" else across),
             _flat_error(part, k, extent),
         )
-    share = np.linalg.norm(terms, axis=0) * (COATED if kind.varies else 1.0)
+    # an admittance that varies is off by more
+    share = np.linalg.norm(terms, axis=0) * (1.5 if kind.varies else 1.0)
     return np.asarray(size * np.minimum(share, 1.0) + (change if order == 1 else 0.0))
 
 
 def _flat_error(part: LitNodes, k: float, extent: float) -> FloatArray:
     """E (n,): what the curvature at the end of a flat surface is worth on it."""
-    flatness = np.maximum(0.0, 1 - FLAT * np.maximum(part.along, 0.0) * extent)
+    flatness = np.maximum(0.0, 1 - 2 * np.maximum(part.along, 0.0) * extent)
     least = np.cbrt(2 / (k * extent))
-    return np.asarray(ENDS * flatness / (k * extent * np.maximum(part.cosine, least) ** 3))
+    return np.asarray(0.7 * flatness / (k * extent * np.maximum(part.cosine, least) ** 3))

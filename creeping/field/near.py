@@ -15,7 +15,7 @@ Also here: e and H of the creeping rays whose tangents pass through points off a
     E = e v b,                             H = e v n         electric soft
 
 p, n and b = n x p are those where the ray leaves, h = H0.b and e = E0.b those where it has landed, u and v the waves of
-`creeping.field.waves.near_wave`, T = J + l J' the width of the ray's tube. A ray carries b onto b and n onto n; what h
+`creeping.field.waves.surface`, T = J + l J' the width of the ray's tube. A ray carries b onto b and n onto n; what h
 varies by across rays gives H along them, (i/k) dh/db, as in the current on the body. E and H along rays that come from
 what u and v vary by along n, of the order m/(k l) at the distance l, are left out; the error counts them.
 
@@ -40,7 +40,6 @@ from creeping.field.layer import heights_of, layer_fields
 from creeping.field.lit_ground import LEFT, UNKNOWN
 from creeping.field.marching.fan_waves import march_alone
 from creeping.field.on_body import field_on_body, rays_on
-from creeping.field.problem import Problem
 from creeping.field.results.conductor_result import ConductorField, vector_near
 from creeping.field.results.point_result import (
     FieldStatus,
@@ -51,6 +50,7 @@ from creeping.field.results.point_result import (
     scalar_near,
 )
 from creeping.field.routes import (
+    Problem,
     Route,
     Served,
     affords,
@@ -62,8 +62,8 @@ from creeping.field.routes import (
     solved_by_itself,
 )
 from creeping.field.waves.far_geometry import fan_strips
-from creeping.field.waves.near_wave import height_above, shed_waves
 from creeping.field.waves.ray_sums import RaySum, own_error, ray_sum
+from creeping.field.waves.surface import height_above, shed_waves
 from creeping.geodesics.states import as_points
 from creeping.geometry.surface import normal, size
 from creeping.rays.fan import RayFan
@@ -72,10 +72,6 @@ from creeping.shadow.attachment import occluded
 
 ON_BODY = 1e-7
 """Distance from the body, in its sizes, below which a point counts as on it."""
-MISSING = 2.0
-"""Bound of what rays leave out on the lit side, the incident wave and a reflected one; in the shadow it is 1."""
-ALONG, COUPLED = 1.5, 0.5
-"""Error by what E and H have along the ray beside the term in kappa_t1, over m/(k l), and of that term."""
 
 
 def near_field(
@@ -201,7 +197,7 @@ def _fields(problem: Problem, points: FloatArray) -> list[PointValues]:
     asked = _Points(problem, points)
     nothing = np.zeros((len(points), 6) if problem.vector else len(points), dtype=complex)
     none = PointValues(
-        *(nothing, nothing, np.where(asked.dark, 1.0, MISSING), np.full(len(points), "bound")),
+        *(nothing, nothing, np.where(asked.dark, 1.0, UNKNOWN), np.full(len(points), "bound")),
         *(np.where(asked.dark, FieldStatus.NO_RAY, FieldStatus.LIT).astype(np.int64), np.full(len(points), "none")),
     )
     must = problem.needs_currents or problem.kind.varies
@@ -345,7 +341,7 @@ def rays_alone(rays: RaySum, lit: BoolArray) -> PointValues:
     status = np.where(lit, FieldStatus.LIT, rays.status).astype(np.int64)
     bad = status != FieldStatus.OK
     # a sum that is not to be trusted has the whole of its waves for a bound already
-    missing = np.where(lit, MISSING, np.where(rays.error > 0, 0.0, 1.0))
+    missing = np.where(lit, UNKNOWN, np.where(rays.error > 0, 0.0, 1.0))
     return PointValues(
         wave=np.zeros_like(rays.values),
         creeping=rays.values,
@@ -373,8 +369,9 @@ def shed_sums(problem: Problem, points: FloatArray) -> list[RaySum]:
     found = []
     for waves, other, along_ray in zip(*(columns_of(one) for one in both), coupled.T, strict=True):
         own = own_error(shed.rays, (waves, other), k, kind, 2, height=height)
-        along = np.minimum(ALONG * m / (k * np.maximum(shed.reach, 1e-300)), 1.0)
-        own = np.linalg.norm([own, along * np.linalg.norm(waves, axis=1), COUPLED * along_ray], axis=0)
+        # what E and H have along the ray beside the term in kappa_t1, and half of that
+        along = np.minimum(1.5 * m / (k * np.maximum(shed.reach, 1e-300)), 1.0)
+        own = np.linalg.norm([own, along * np.linalg.norm(waves, axis=1), 0.5 * along_ray], axis=0)
         found.append(ray_sum(fan, shed, len(points), waves, own, k, ELECTRIC_HARD, strength))
     return found
 

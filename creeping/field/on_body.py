@@ -11,7 +11,7 @@ solution of the integral equation stands for all of it, where it is affordable (
 
 Of a conductor all of this is of J = n x H, of each polarisation, and
 
-    n.E = div J/(ik),   dH_n/dn = -div (J x n),   div v = sum_t t.[v(x + h t) - v(x - h t)]/2h,   kh = CLOSE
+    n.E = div J/(ik),   dH_n/dn = -div (J x n),   div v = sum_t t.[v(x + h t) - v(x - h t)]/2h,   kh = 0.02
 
 with two tangents t at x. The charge of expansions has the error of J in both of its slopes. Errors are those of scalar
 fields, |J| in place of |u|; what comes to the lit side later is taken to be as much as what comes there at first.
@@ -38,7 +38,6 @@ from creeping.field.equation.currents import ON_BODY, ConductorTileCurrents, Til
 from creeping.field.lit_ground import composed, lit_error, without_tips
 from creeping.field.marching.fan_waves import fan_waves, march_alone, marched_sums, scalar_on_rays
 from creeping.field.on_rays import own_waves
-from creeping.field.problem import Problem
 from creeping.field.results.conductor_result import ConductorCurrent, vector_on_body
 from creeping.field.results.point_result import (
     FieldStatus,
@@ -49,7 +48,7 @@ from creeping.field.results.point_result import (
     measured_field,
     scalar_on_body,
 )
-from creeping.field.routes import currents_behind, left_behind, marches, stands_alone
+from creeping.field.routes import Problem, currents_behind, left_behind, marches, stands_alone
 from creeping.field.waves.beams import wide
 from creeping.field.waves.far_geometry import fan_strips
 from creeping.field.waves.ray_sums import RaySum, own_error, ray_sum, total_of
@@ -61,9 +60,6 @@ from creeping.geometry.surface import Surface, normal, project, size
 from creeping.rays.fan import RayFan
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import shed_on
-
-CLOSE = 0.02
-"""kh: expansions are smooth to rounding."""
 
 
 def surface_field(
@@ -233,7 +229,7 @@ def crosses(body: Surface, direction: FloatArray, points: FloatArray, k: float) 
     """Crosses at points of a body (n, 3), L."""
     n = normal(body, points)
     first = axes_of_incidence(n, direction)
-    sides = [project(body, points + sign * CLOSE / k * t) for t in (first, np.cross(n, first)) for sign in (1.0, -1.0)]
+    sides = [project(body, points + sign * 0.02 / k * t) for t in (first, np.cross(n, first)) for sign in (1.0, -1.0)]
     apart = np.stack([a - b for a, b in zip(sides[0::2], sides[1::2], strict=True)])
     around = np.concatenate([points, *sides])
     return Crosses(around, normal(body, around), apart)

@@ -24,22 +24,18 @@ import numpy as np
 from creeping._typing import BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked, checked_plain, scales
-from creeping.field.boundary import Boundary, BoundaryLike
-from creeping.field.creeping_modes import fock_scale
+from creeping.field.boundary import Boundary, BoundaryLike, fock_scale
+from creeping.field.fock import surface_function
 from creeping.field.marching.fan_waves import fan_waves, march_alone, marchable, spread_out
-from creeping.field.problem import Problem
 from creeping.field.results.point_result import FieldStatus, PointValues, SurfaceField, scalar_on_body
-from creeping.field.special.fock import surface_function
-from creeping.field.waves.gaussian_beams import beam_length
-from creeping.field.waves.ray_sums import NARROW_ALONE, own_error, tube_share
+from creeping.field.routes import Problem
+from creeping.field.waves.beams import beam_length
+from creeping.field.waves.ray_sums import own_error, tube_share
 from creeping.field.waves.surface import scalar_boundary, surface_waves
 from creeping.geometry.incident import PointSource, plane_direction
 from creeping.rays.fan import RayFan
 from creeping.rays.quantities import RayPoints
 from creeping.rays.strips import ray_points
-
-QUARTERS = np.array([1.0, -1j, -1.0, 1j])
-"""e^{-iπN/2}."""
 
 
 def own_waves(problem: Problem) -> SurfaceField:
@@ -73,7 +69,7 @@ def own_waves(problem: Problem) -> SurfaceField:
         wide[known] = _wide(fan, rays, k)[known]
         beyond &= ~known
     status = np.select(
-        [np.broadcast_to(~launched, shape), beyond, wide < NARROW_ALONE],
+        [np.broadcast_to(~launched, shape), beyond, wide < 1],
         [FieldStatus.NO_RAY, FieldStatus.DETACHED, FieldStatus.CAUSTIC],
         FieldStatus.OK,
     )
@@ -152,7 +148,8 @@ def ray_envelope(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike) -> C
     if kind.kind == "soft":
         strength = strength / fock_scale(k, last)
     finite = np.isfinite(strength)
-    turned = wave * QUARTERS[fan.caustic_index[here] % 4]
+    # e^{-iπN/2}
+    turned = wave * np.array([1.0, -1j, -1.0, 1j])[fan.caustic_index[here] % 4]
     # inf times a complex number would be NaN
     out[here] = np.where(finite, turned * np.where(finite, strength, 0.0), np.inf)
     return out

@@ -25,7 +25,8 @@ from creeping.field.arguments import checked, checked_plain, observers_of
 from creeping.field.boundary import BoundaryLike, boundary_name
 from creeping.field.equation.effort import SECONDS, plan_of
 from creeping.field.equation.solving import is_rough, solution_for, solve_together
-from creeping.field.near import MISSING, near_field
+from creeping.field.lit_ground import UNKNOWN
+from creeping.field.near import near_field
 from creeping.field.results.labelled import ArrayResult, Tabled, dataset, directed
 from creeping.field.results.point_result import FieldStatus, NearField, WithStatus
 from creeping.field.waves.surface import scalar_boundary
@@ -38,11 +39,6 @@ from creeping.shadow.line import shadow_line
 
 if TYPE_CHECKING:
     import xarray
-
-N_RAYS = 48
-"""Rays of each incidence: their waves are interpolated between them."""
-BY_RAYS = 0.2
-"""Seconds that rays of an incidence take at least, at ka = 30."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -125,7 +121,7 @@ def source_pattern(
     *,
     wavenumber: float,
     boundary: BoundaryLike = "hard",
-    n_rays: int = N_RAYS,
+    n_rays: int = 48,
 ) -> SourcePattern:
     """Far fields of point sources on a body or near it; by reciprocity also the reception of plane waves there.
 
@@ -174,7 +170,7 @@ def source_pattern(
     if not len(x):
         raise InvalidInputError("no sources; give points (s, 3) on the body or outside")
     shape = len(r), len(x)
-    values, error = np.zeros(shape, dtype=complex), np.full(shape, MISSING)
+    values, error = np.zeros(shape, dtype=complex), np.full(shape, UNKNOWN)
     status = np.full(shape, int(FieldStatus.UNRESOLVED))
     error_by, method = np.full(shape, "bound", dtype="<U24"), np.full(shape, "none", dtype="<U16")
     together = _solved_together(flow.body, r, k, boundary)
@@ -204,7 +200,8 @@ def source_pattern(
 def _solved_together(body: Surface, towards: FloatArray, k: float, boundary: BoundaryLike) -> bool:
     """Solve the equation for plane waves from directions (m, 3) and keep it, if that takes no longer than rays."""
     plan = plan_of(body, k, boundary, incidences=len(towards))
-    pays = not plan.refused and not plan.effort.coarse and plan.seconds <= SECONDS + BY_RAYS * len(towards)
+    # rays take 0.2 s for an incidence at least, at ka = 30
+    pays = not plan.refused and not plan.effort.coarse and plan.seconds <= SECONDS + 0.2 * len(towards)
     if pays and not is_rough(body):
         solve_together(body, -towards, k, boundary)
     return pays

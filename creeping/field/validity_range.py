@@ -15,7 +15,7 @@ import numpy as np
 
 from creeping._typing import FloatArray
 from creeping.field.arguments import checked
-from creeping.field.creeping_modes import fock_scale
+from creeping.field.boundary import fock_scale
 from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.equations import sharpest_curvature
 from creeping.geodesics.integrator import trace_states

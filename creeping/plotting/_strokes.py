@@ -13,8 +13,7 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray
 from creeping.errors import InvalidInputError
-from creeping.field.boundary import BoundaryLike, scalar_boundaries
-from creeping.field.creeping_modes import fock_scale, slowest_decay
+from creeping.field.boundary import BoundaryLike, fock_scale, scalar_boundaries, slowest_decay
 from creeping.geometry.checks import UNKNOWN
 from creeping.geometry.evaluators import speed_of
 from creeping.geometry.surface import size

@@ -30,8 +30,7 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.waves.far_geometry import FarGeometry
-from creeping.field.waves.far_rays import Parts
-from creeping.field.waves.strip_waves import isolated, sheets_of
+from creeping.field.waves.far_rays import Parts, isolated, sheets_of
 from creeping.geometry.surface import Surface
 from creeping.rays.transport import Flow
 from creeping.shadow.status import FOLLOWED, OK
@@ -216,7 +215,7 @@ class Nodes:
         Twice the number of the observer, and 1 more for creeping rays.
     path : (sheets,), L
     amplitudes : (sheets, problems), L
-        As of `creeping.field.waves.strip_waves.Sheets`.
+        As of `creeping.field.waves.far_rays.Sheets`.
     """
 
     def __init__(self, sweeper: Sweeper, lattice: Lattice) -> None:

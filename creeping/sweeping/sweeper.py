@@ -25,9 +25,8 @@ from creeping.field.boundary import BoundaryLike, parse_boundary
 from creeping.field.currents.whole_body import far_by_currents
 from creeping.field.equation.solving import POOR, asked_solution, solution_for, solve_together, solved_alone
 from creeping.field.far import far_field
-from creeping.field.problem import Problem
 from creeping.field.results.far_result import FarField
-from creeping.field.routes import far_currents
+from creeping.field.routes import Problem, far_currents
 from creeping.field.tmatrix.computing import kept_t_matrix
 from creeping.field.validity_range import is_reached, launch_validity, validities
 from creeping.field.waves.far_geometry import FarGeometry

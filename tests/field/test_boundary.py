@@ -1,14 +1,11 @@
 """Boundaries by name, and the decay coefficients against their closed forms and differences."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import creeping as cr
-from creeping.field.boundary import scalar_boundaries
-from creeping.field.creeping_modes import decay_slopes, decay_terms, fock_scale, modes_of
-from creeping.field.special.airy import hard_modes, impedance_modes, soft_modes
+from creeping.field.airy import hard_modes, impedance_modes, soft_modes
+from creeping.field.boundary import decay_slopes, decay_terms, fock_scale, modes_of, scalar_boundaries
 
 SOFT, HARD = scalar_boundaries("soft")[0], scalar_boundaries("hard")[0]
 
@@ -41,7 +38,7 @@ def test_decay_slopes_are_differences_at_constant_q(q, sign):
     def shifted(h):
         tau = modes.tau + h
         m0 = 0 * tau if q is None else 1 / (tau - q**2)
-        return replace(modes, tau=tau, m0=m0, q_m0=m0 * (0 if q is None else q))
+        return modes._replace(tau=tau, m0=m0, q_m0=m0 * (0 if q is None else q))
 
     h = 1e-5
     after, before = (decay_terms(shifted(k * h), sign) for k in (1, -1))

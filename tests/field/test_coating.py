@@ -6,7 +6,7 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.field import routes
-from creeping.field.special.fock import surface_function
+from creeping.field.fock import surface_function
 from tests.reference import sphere, sphere_admittance
 
 K = 25.0

@@ -6,8 +6,8 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.errors import InvalidInputError
-from creeping.field.special.airy import hard_modes
-from creeping.field.special.fock import HIGH, height_gain, transition, transition_rate
+from creeping.field.airy import hard_modes
+from creeping.field.fock import HIGH, height_gain, transition, transition_rate
 
 D = np.array([0.3, 0.2, 0.9]) / np.linalg.norm([0.3, 0.2, 0.9])
 

@@ -5,11 +5,11 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
-from creeping.field.ports import beams, sums
+from creeping.field.ports import sums
 from creeping.geometry.surface import project
 
 EGG = sc.Ellipsoid(1.0, 0.8, 0.6)
-DENSE = ((beams, "APART", 0.5), (beams, "STEP", 0.5), (beams, "FEWEST", 2))
+DENSE = ((sums, "DENSE", (0.5, 0.5, 2)),)
 
 
 @pytest.fixture(scope="module")
@@ -42,8 +42,8 @@ def coupled(ports):
         ("ports", ((sums, "CUTS", (0.64, 1, 1)),), 1.0),
         ("ports", ((sums, "APART", 0.75),), 1.0),
         ("ports", ((sums, "APART", 1.5),), 1.0),
-        ("ports", ((beams, "WIDTH", 0.7),), 1.0),
-        ("ports", ((beams, "WIDTH", 1.4),), 1.0),
+        ("ports", ((sums, "WIDTH", 0.7),), 1.0),
+        ("ports", ((sums, "WIDTH", 1.4),), 1.0),
     ],
 )
 def test_what_is_free_changes_little(kind, changes, share, coupled, monkeypatch):

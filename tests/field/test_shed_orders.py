@@ -9,7 +9,7 @@ import shared_bodies as sc
 import creeping as cr
 from creeping.field.arguments import fock_parameter
 from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT, HARD, SOFT, Boundary
-from creeping.field.special.fock import SERIES
+from creeping.field.fock import SERIES
 from creeping.field.waves.far_geometry import far_geometry
 from creeping.field.waves.shed_wave import SECOND_ORDER, shed_orders, shed_wave
 from creeping.geometry.directions import fibonacci_directions

@@ -8,8 +8,7 @@ import shared_bodies as sc
 from scipy.special import ai_zeros
 
 import creeping as cr
-from creeping.field.boundary import HARD
-from creeping.field.creeping_modes import modes_of
+from creeping.field.boundary import HARD, modes_of
 from creeping.geometry.surface import size
 from creeping.rays.reach import (
     DECAY,

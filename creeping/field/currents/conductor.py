@@ -14,13 +14,14 @@ Also here: the same by marched waves, for rays and for the beams that carry vect
 
     u: H along b, u_n + kappa_t u = 0,   v: dE/dn along b, E = 0
     J = sum of beams of u with V + M n V',   V = -h (1 + T C) p - t rho j p + (j + h t rho C) b,   V' = -h b
-    error^2 = (|h| e_u)^2 + (|e| e_v/k)^2 + [A max(1, r) |u|/m^4]^2 + [B |u|/m^2]^2
+    error^2 = (|h| e_u)^2 + (|e| e_v/k)^2 + [0.5 max(1, r) |u|/m^4]^2 + [0.25 |u|/m^2]^2
 
 with C = Du/(2 m^2 u) of creeping modes, 0 where they have ended; m and r = rho kappa_t in the error are of the launch
 point. The condition of u is that of E along the ray, (curl H)_p = 0 on the body. The beam of u turns by M n, so that
 -h (p + M n b) is (i/k) grad (h u): beside a ray that is its -e (i kappa_t1/(kJ)) u b, which grows without bound where
-J = 0, and the sum does not. A stands for what both scalar problems leave out of Maxwell's, B for what passes from one
-to the other where the body twists; both were set on a sphere, three ellipsoids, an egg and the twisted ellipsoid.
+J = 0, and the sum does not. The third term of the error stands for what both scalar problems leave out of Maxwell's,
+the last for what passes from one to the other where the body twists; both were set on a sphere, three ellipsoids, an
+egg and the twisted ellipsoid.
 
 Sources: [F46], [CK13, sec. 6.2]; [C93], [P82]; Derivations, F18, F22, F24, F26 and F31.
 """
@@ -44,20 +45,17 @@ from creeping.field.currents.radiation import (
     received_vectors,
 )
 from creeping.field.currents.whole_body import SurfaceCurrents, level_at
+from creeping.field.fock import surface_function
 from creeping.field.marching.fan_rays import FLAT
-from creeping.field.marching.fan_waves import FanWaves, OnRays, at_shed
+from creeping.field.marching.fan_waves import FanWaves, OnRays, StripTable, at_shed, resampled, without_tubes
 from creeping.field.results.far_result import spherical_frame
-from creeping.field.special.fock import surface_function
 from creeping.field.waves.shed_wave import smoothstep
-from creeping.field.waves.strip_waves import StripTable, resampled, without_tubes
 from creeping.field.waves.surface import ray_factor, surface_waves
 from creeping.geometry.quadrature import BodyNodes, nodes_at
 from creeping.geometry.surface import Surface
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays
 
-NEXT, MIXED = 0.5, 0.25
-"""A and B."""
 LEAST = 1e-9
 """Size of u below which v and Du are no shares of it."""
 
@@ -284,7 +282,7 @@ class ConductorWaves:
         J = vectors_of(p, np.cross(nodes.normals, p), h, across, y, turn, y * change)
         size = np.maximum(np.linalg.norm(J, axis=1), np.abs(y)[:, None])
         m, r = scales(rays, k)[0], np.abs(transverse_ratios(rays)[0])
-        rest = np.abs(y) * np.hypot(NEXT * np.maximum(r, 1.0) / m**4, MIXED / m**2)
+        rest = np.abs(y) * np.hypot(0.5 * np.maximum(r, 1.0) / m**4, 0.25 / m**2)
         with np.errstate(divide="ignore", invalid="ignore"):
             error = np.sqrt(np.abs(h * off_u[:, None]) ** 2 + np.abs(e * off_v[:, None] / k) ** 2 + rest[:, None] ** 2)
             share = np.where(size > 0, error / size, 0.0)

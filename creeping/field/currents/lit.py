@@ -53,9 +53,8 @@ from typing import NamedTuple
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
-from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT, Boundary
-from creeping.field.creeping_modes import fock_scale
-from creeping.field.special.fock import surface_function, surface_slope
+from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT, Boundary, fock_scale
+from creeping.field.fock import surface_function, surface_slope
 from creeping.field.waves.reflected import plane_reflection
 from creeping.field.waves.shed_wave import limited, smoothstep
 
@@ -65,8 +64,6 @@ BOUND = 0.5
 """Bound of the second order, as a share of the first: beyond a third of it the expansion fails."""
 LEAST_SCALE = 0.7
 """m below which nothing is expanded in 1/m^2."""
-NEXT = 1e-3
-"""Step in q of its derivatives, as a share of it."""
 STEEPEST = 20.0
 """Bound of |kappa_b/kappa_a| in the second order."""
 
@@ -209,8 +206,9 @@ def _corrections(at: _Local, q: ComplexArray | float | None, g: ComplexArray, bo
 def _memory(at: _Local, q: ComplexArray, g: ComplexArray, boundary: Boundary) -> ComplexArray:
     """G (n,)."""
     slope = surface_slope(at.xi, q)
-    pairs = [[surface_slope(at.xi, q * (1 + sense * NEXT), n) for sense in (1, -1)] for n in (0, 1)]
-    bend, turned = ((ahead - behind) / (2 * NEXT * q) for ahead, behind in pairs)
+    # differenced over a thousandth of q to either side
+    pairs = [[surface_slope(at.xi, q * (1 + step), n) for step in (1e-3, -1e-3)] for n in (0, 1)]
+    bend, turned = ((ahead - behind) / (2e-3 * q) for ahead, behind in pairs)
     return np.asarray(boundary.drift / at.along * (g + 2 * q * slope + (q**2 * bend - turned) / 2))
 
 

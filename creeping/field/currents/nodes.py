@@ -23,8 +23,7 @@ import numpy as np
 
 from creeping._typing import BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError, SurfaceError
-from creeping.field.boundary import Boundary
-from creeping.field.creeping_modes import fock_scale, slowest_decay
+from creeping.field.boundary import Boundary, fock_scale, slowest_decay
 from creeping.field.currents.lit import lit_currents
 from creeping.field.marching.fan_waves import fan_waves, march_alone, marchable, spread_out
 from creeping.field.waves.shed_wave import smoothstep
@@ -45,14 +44,8 @@ PENUMBRA = (0.0, 0.6)
 """xi over which the rays take over from the lit side's nodes."""
 TAKEN_OVER = 2 * PENUMBRA[1]
 """xi by m at the start of a ray beyond which it has taken over: twice the end, for m at its points is another."""
-VARYING = 6.0
-"""-xi up to which the rate of curvature matters."""
-RAYS, GAP, STEPS = 4.0, 0.5, 5.0
-"""Rays a wavelength along the line, their largest distance in wavelengths, and steps a wavelength along them."""
-SLOWEST = 1e-3
-"""Least Im tau: a mode that decays less ends with the longest rays."""
-END = 0.15
-"""Share of a ray over which its weight falls to 0 at its end: a cut would radiate."""
+RAYS, STEPS = 4.0, 5.0
+"""Rays a wavelength along the line, and steps a wavelength along them."""
 STEP = 1e-4
 """Distance over which curvature is differenced, in body sizes."""
 
@@ -158,23 +151,13 @@ def lit_part(body: Surface, line: ShadowLine, nodes: BodyNodes, wavenumber: floa
     at = np.flatnonzero(kept)
     share = np.where(dark[at], 1 - smoothstep(xi[at], *PENUMBRA), 1.0)
     rate, bend = np.zeros((2, len(at)))
-    varies = (along[at] > 0) & (xi[at] > -VARYING)
+    # farther towards the light the rate of curvature does not matter
+    varies = (along[at] > 0) & (xi[at] > -6)
     rate[varies], bend[varies] = radius_rates(body, nodes.points[at][varies], d, along[at][varies])
     taken = nodes.part(at)
     axes = axes_of_incidence(taken.normals, d)
-    found = LitNodes(
-        taken.points,
-        taken.normals,
-        taken.weights * share,
-        cosine[at],
-        along[at],
-        across[at],
-        rate,
-        bend,
-        axes,
-        taken.twist(axes),
-    )
-    return at, found
+    scalars = cosine[at], along[at], across[at], rate, bend
+    return at, LitNodes(taken.points, taken.normals, taken.weights * share, *scalars, axes, taken.twist(axes))
 
 
 def _out_of_the_wave(line: ShadowLine, points: FloatArray, dark: BoolArray) -> BoolArray:
@@ -228,13 +211,14 @@ def ray_nodes(fan: RayFan, wavenumber: float, boundary: Boundary) -> RayNodes:
     # marches ask for some rays on each arc, and arcs of bodies of pieces are many and short
     fewest = 96 if is_piecewise(fan.body) else 16
     n_rays = max(fewest, int(np.ceil(RAYS * attached / wavelength)))
-    dense = launch(fan.flow, fan.line, length=length, n_rays=n_rays, max_gap=GAP * wavelength, measured=False)
+    dense = launch(fan.flow, fan.line, length=length, n_rays=n_rays, max_gap=0.5 * wavelength, measured=False)
     times = np.linspace(0.0, length, max(16, int(np.ceil(STEPS * length / wavelength))) + 1)
     _, rays = ray_points(dense, times)
     ds = np.full(len(times), times[1])
     ds[[0, -1]] /= 2
     weights = np.abs(rays.spreading) * ds * (dense.spacing * rays.width[:, 0])[:, None]
-    weights = weights * (1 - smoothstep(times, (1 - END) * length, length))
+    # a cut at the end would radiate
+    weights = weights * (1 - smoothstep(times, 0.85 * length, length))
     shape = rays.time.shape
     points = rays.points.reshape(-1, 3)
     normals = normal(fan.body, points).reshape(*shape, 3)
@@ -253,7 +237,8 @@ def _length(fan: RayFan, wavenumber: float, boundary: Boundary) -> float:
     # a boundary's own mode may be slower than the hard one's, by which rays are long by default
     m = fock_scale(wavenumber, np.median(typical, keepdims=True) if len(typical) else np.ones(1))
     slowest = slowest_decay(boundary, m, fan.points[:, 0]) if np.all(np.isfinite(m)) else 0.0
-    return ray_length(fan.line, wavenumber=wavenumber, decay=max(slowest, SLOWEST))
+    # a mode that decays less ends with the longest rays
+    return ray_length(fan.line, wavenumber=wavenumber, decay=max(slowest, 1e-3))
 
 
 def _share_of_rays(

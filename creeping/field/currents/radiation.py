@@ -38,25 +38,10 @@ from creeping.geometry.curvature import curvature_norms, gaussian_curvature
 from creeping.geometry.surface import Surface, memo
 from creeping.kernels.threads import in_threads
 
-TOLERANCE = 1e-9
-"""Of the transform, as a share of its largest value."""
-PER_NODE, PER_CELL = 1500.0, 60.0
-"""What a node and a cell of its grid cost, in terms of one direction seen from one node."""
-OVERSAMPLED, RIM = 2.0, 20
-"""Cells of the grid for each that the bandwidth asks for, and cells more along a side."""
-MOST_CELLS = 40_000_000
-"""Cells of the grid beyond which directions are taken one by one: 0.6 GB."""
-
 LOW = 0.3
 """T up to which W rises."""
 BLOCK = 16
 """Nodes that are looked at together, neighbours in space."""
-VECTOR = 2.5
-"""What a pair of a conductor takes of that, both polarisations."""
-MOST_PAIRS = 4e9
-"""Pairs of a point and a node up to which it is done: eight seconds, if all stand above each other's horizon."""
-SADDLE = -1e-3
-"""K, over the square of the largest curvature, below which a body is not convex."""
 
 
 def phase_sums(points: FloatArray, weights: ComplexArray, directions: FloatArray, wavenumber: float) -> ComplexArray:
@@ -79,22 +64,21 @@ def phase_sums(points: FloatArray, weights: ComplexArray, directions: FloatArray
     out = np.empty((len(directions), 2 * columns))
     directions = np.ascontiguousarray(directions)
     in_threads(
-        lambda part: distant(turns, real, imaginary, directions[part], out[part]),
-        len(directions),
-        least=32,
-        multiple=8,
+        lambda part: distant(turns, real, imaginary, directions[part], out[part]), len(out), least=32, multiple=8
     )
     return np.asarray(out[:, :columns] + 1j * out[:, columns:])
 
 
 def grid_cells(widths: FloatArray, wavenumber: float) -> float:
     """Cells of the transform's grid for nodes in a box of such widths (3,), L, and all directions."""
-    return float(np.prod(OVERSAMPLED * wavenumber * widths / np.pi + RIM))
+    # two for each that the bandwidth asks for, and twenty more along a side
+    return float(np.prod(2 * wavenumber * widths / np.pi + 20))
 
 
 def transformed(nodes: int, directions: int, cells: float) -> bool:
-    """Whether directions are worth a transform of so many cells."""
-    return cells <= MOST_CELLS and PER_NODE * nodes + PER_CELL * cells < nodes * directions
+    """Whether directions are worth a transform of so many cells, 0.6 GB of them at most."""
+    # what a node and a cell cost, in terms of one direction seen from one node
+    return cells <= 40_000_000 and 1500.0 * nodes + 60.0 * cells < nodes * directions
 
 
 def _by_transform(points: FloatArray, weights: ComplexArray, directions: FloatArray, wavenumber: float) -> ComplexArray:
@@ -102,7 +86,7 @@ def _by_transform(points: FloatArray, weights: ComplexArray, directions: FloatAr
 
     x, k = np.ascontiguousarray(points.T), np.ascontiguousarray(wavenumber * directions.T)
     # one column at a time bounds the memory; one thread adds in one order
-    options = {"eps": TOLERANCE, "isign": -1, "nthreads": 1}
+    options = {"eps": 1e-9, "isign": -1, "nthreads": 1}
     sums = [finufft.nufft3d3(*x, np.ascontiguousarray(w, dtype=complex), *k, **options) for w in weights]
     return np.stack(sums, axis=1) if sums else np.zeros((len(directions), 0), dtype=complex)
 
@@ -146,12 +130,7 @@ def field_of_scalar(
     columns = np.ascontiguousarray(points.T), np.ascontiguousarray(normals.T)
     pairs = [np.ascontiguousarray(np.stack([w.real, w.imag])) for w in (single, double)]
     at = np.ascontiguousarray(at)
-    in_threads(
-        lambda part: near(*columns, *pairs, wavenumber, at[part], out[part]),
-        len(at),
-        least=32,
-        multiple=8,
-    )
+    in_threads(lambda part: near(*columns, *pairs, wavenumber, at[part], out[part]), len(at), least=32, multiple=8)
     field = out[:, : len(nothing)] + 1j * out[:, len(nothing) :]
     return np.asarray(field if given is not None and given.ndim > 1 else field[:, 0])
 
@@ -196,12 +175,8 @@ def _vector_sums(
     real, imaginary = np.ascontiguousarray(J.real), np.ascontiguousarray(J.imag)
     out = np.empty((len(at), 6))
     columns, at = np.ascontiguousarray(points.T), np.ascontiguousarray(at)
-    in_threads(
-        lambda part: kernel(columns, real, imaginary, wavenumber, at[part], out[part]),
-        len(at),
-        least=32,
-        multiple=8,
-    )
+    given = columns, real, imaginary, wavenumber
+    in_threads(lambda part: kernel(*given, at[part], out[part]), len(at), least=32, multiple=8)
     return np.asarray(out[:, :3] + 1j * out[:, 3:])
 
 
@@ -213,8 +188,8 @@ def self_reflects(part: LitNodes) -> bool:
 
 
 def _has_saddles(gauss: FloatArray, square: FloatArray) -> bool:
-    """Whether K is negative anywhere (n,), by the largest (kappa_1 + kappa_2)^2 (n,)."""
-    return bool(np.min(gauss, initial=0.0) < SADDLE * np.max(square, initial=0.0))
+    """Whether K is negative anywhere (n,), beyond a thousandth of the largest (kappa_1 + kappa_2)^2 (n,)."""
+    return bool(np.min(gauss, initial=0.0) < -1e-3 * np.max(square, initial=0.0))
 
 
 def may_self_reflect(body: Surface) -> bool:
@@ -267,7 +242,8 @@ def received_vectors(
     from creeping.field.kernels.bounce import vectors_from_above
 
     waves = strength.shape[2]
-    if not _affordable(at, nodes, VECTOR):
+    # both polarisations of a conductor take as long as 2.5 scalar pairs
+    if not _affordable(at, nodes, 2.5):
         return np.zeros((len(at[0]), 3, waves), dtype=complex)
     place, points, of = _blocks(at)
     order, sources, others = _blocks(nodes)
@@ -285,7 +261,8 @@ def received_vectors(
 
 
 def _affordable(at: tuple[FloatArray, FloatArray], nodes: tuple[FloatArray, FloatArray], each: float = 1.0) -> bool:
-    return 0 < each * len(at[0]) * len(nodes[0]) < MOST_PAIRS
+    """Whether pairs take no more than eight seconds, if all stand above each other's horizon."""
+    return 0 < each * len(at[0]) * len(nodes[0]) < 4e9
 
 
 def _blocks(

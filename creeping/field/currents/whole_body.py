@@ -61,20 +61,8 @@ DEPTH = 0.25
 """Least depth, in wavelengths, of the points inside at which currents are judged: nearer the sums over nodes err."""
 SHALLOW = 0.12
 """Least depth where the body is too thin for that."""
-RIM = 0.3
-"""Share of the error, in the square, that stands next to the shadow line."""
-AHEAD = 1.0
-"""What of epsilon the field itself is off by, where it is large."""
-QUADRATURE = 4e-4
-"""What sums over the nodes of expansions err by at least, of f_rms, however little is left inside: spheres of
-ka = 100 to 250, soft and hard."""
-BESIDE, STEP, LARGEST = 6, 0.05, 2.0
-"""Nodes next to one, the change of admittance to these from which it steps, and |u| of a wave that comes back."""
 POINTS = 100
 """Points inside at which they are judged."""
-
-ABSORBING_LEVEL = 1.3
-"""L in the light of an impedance: most of what is wrong with its currents stands at the line and radiates ahead."""
 OFF = 0.25
 """Least distance from the body, in wavelengths, at which currents serve."""
 
@@ -251,15 +239,16 @@ class SurfaceCurrents:
         # both polarisations of a scattered wave have a share in its rms
         share = self._amplitude / np.sqrt(1 + np.ndim(self._amplitude))
         along = self._together(r).reshape(-1, *(1,) * (change.ndim - 1))
-        own = AHEAD * np.abs(self.far(r))
-        error = self._left * np.hypot(np.hypot(level * share * along, own), shape * change)
-        return np.asarray(np.hypot(error, 0.0 if self.solved else QUADRATURE * self._amplitude))
+        error = self._left * np.hypot(np.hypot(level * share * along, np.abs(self.far(r))), shape * change)
+        # sums over the nodes of expansions err by as much, of spheres of ka = 100 to 250, however little is left inside
+        return np.asarray(np.hypot(error, 0.0 if self.solved else 4e-4 * self._amplitude))
 
     def total(self, points: FloatArray, dark: BoolArray) -> tuple[ComplexArray, FloatArray]:
         """Total field and its error at points (m, 3), L, off the body, some of them in the dark: (m,) each."""
         lit, shadow, factor = self._levels
         if self.boundary.kind == "impedance":
-            lit = ABSORBING_LEVEL
+            # most of what is wrong with its currents stands at the line and radiates ahead
+            lit = 1.3
         level = level_at(self, points, dark, self.mean_amplitude, lit, shadow)
         x = self._off_the_body(points)
         # on the lit nodes and on the others, whose second orders count apart
@@ -285,7 +274,7 @@ class SurfaceCurrents:
         wave = np.exp(1j * k * (self.rim @ self.direction))
         step = self.rim_length / len(self.rim)
         S = np.abs(step * phase_sums(self.rim, wave[None], directions, k)[:, 0]) ** 2 / (np.pi * self.rim_length / k)
-        return np.sqrt(1 + RIM * np.maximum(S - 1, 0.0))
+        return np.sqrt(1 + 0.3 * np.maximum(S - 1, 0.0))
 
     @cached_property
     def _nodes(self) -> Any:
@@ -313,9 +302,10 @@ class SurfaceCurrents:
         if not self.boundary.varies:
             return 0.0
         eta = np.broadcast_to(self.boundary.at(self.points).admittance, (len(self.points),))
-        step = np.max(np.abs(eta[self._nodes.query(self.points, BESIDE)[1]] - eta[:, None]), axis=1)
-        off = np.where(step > STEP, step, 0.0) * self.weights * np.abs(self.values)
-        return float(self.wavenumber / (4 * np.pi) * np.sqrt(np.sum(off**2) / 12) * LARGEST)
+        # from a node to the next five; |u| of a wave that comes back is up to 2
+        step = np.max(np.abs(eta[self._nodes.query(self.points, 6)[1]] - eta[:, None]), axis=1)
+        off = np.where(step > 0.05, step, 0.0) * self.weights * np.abs(self.values)
+        return float(self.wavenumber / (4 * np.pi) * np.sqrt(np.sum(off**2) / 12) * 2)
 
     def _remainder(self, points: FloatArray, scattered: ComplexArray) -> ComplexArray:
         """Incident and scattered field at points (m, 3), L: (m, ...)."""

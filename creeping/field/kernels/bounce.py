@@ -14,9 +14,9 @@ The phase is linear on a triangle: with u and v those of two corners relative to
     ∫ e^{iφ} dS = 2A e^{iφ0} I,   I = (g(u) - g(v))/(i(u - v)),   g(x) = (e^{ix} - 1)/(ix) = e^{ix/2} sin(x/2)/(x/2)
 
 φ0 is that of the corner opposite to the side whose phases differ most, so that only where all are alike,
-|u - v| < NEAR, differences cancel: there, with h_j the sum of u^a v^b over a + b = j,
+|u - v| < 0.2, differences cancel: there, with h_j the sum of u^a v^b over a + b = j,
 
-    I = Σ_j i^j h_j/(j + 2)!,   j < TERMS
+    I = Σ_j i^j h_j/(j + 2)!,   j < 8, the next is below 1e-12
 
 Sources: Derivations, F29 and F13.
 """
@@ -26,14 +26,9 @@ import math
 import numpy as np
 from numba import njit
 
+from creeping.field.kernels.near_pairs import TOUCHING
 from creeping.kernels.block import entry_options, options
 from creeping.kernels.exponential import cosine_sine
-
-TOUCHING = 1e-6
-"""Distance, over 1/k, below which a node is the point itself."""
-
-NEAR, TERMS = 0.2, 8
-"""Difference of phases below which the integral is its series, and terms of that: the next is below 1e-12."""
 
 
 @njit(**entry_options)
@@ -207,7 +202,7 @@ def _series(u, v):
     """Real and imaginary part of I where u - v is small."""
     real = imaginary = 0.0
     power, high, factor, turn = 1.0, 1.0, 0.5, 0
-    for j in range(TERMS):
+    for j in range(8):
         term = factor * power
         real += term if turn == 0 else (-term if turn == 2 else 0.0)
         imaginary += term if turn == 1 else (-term if turn == 3 else 0.0)
@@ -245,7 +240,7 @@ def triangle_waves(corners, vectors, weights, out):
                 base, u, v = a, b - a, c - a
             else:
                 base, u, v = b, c - b, a - b
-            if abs(u - v) < NEAR:
+            if abs(u - v) < 0.2:
                 real, imaginary = _series(u, v)
             else:
                 fr, fi = _ramp(u)

@@ -44,17 +44,9 @@ from creeping.field.kernels.ray_profile import angle, displacement, interval, va
 from creeping.kernels.block import options, strict_options
 from creeping.kernels.vectors import LANES
 
-LEAST_SPREADING, LEAST_TUBE = 0.05, 0.2
-"""J and h_a below which the incident wave's tube is held: behind the line rays may cross."""
-
-LEAST_COSINE = 1e-3
-"""Of incidence."""
-LEAST_FORWARD, FORWARD = 0.02, 0.2
-"""Reflected rays whose share along the start's tangent is between these are faded out: they rise too steeply for a wave
-that is marched, and a wave that ended at a height would radiate from there."""
-FIRST, LARGEST, LEAST = 0.1, 0.05, 1e-6
-"""Steps back: the first in terms of the spacing of heights, the largest and the least of the way back."""
-
+LEAST_FORWARD = 0.02
+"""Share along the start's tangent below which reflected rays are nothing, faded out from 0.2 on: they rise too steeply
+for a wave that is marched, and a wave that ended at a height would radiate from there."""
 TERMS = 7
 """Powers of n."""
 ROUNDS = 4
@@ -121,7 +113,8 @@ def load_steps(
         j = interval(s, edges[i])
         t = edges[i] - s[j]
         lit[i, 0], lit[i, 1], lit[i, 2] = value(climb[j], t), value(phase[j], t), value(across[j], t)
-        lit[i, 3] = max(value(spreading[j], t), LEAST_SPREADING)
+        # behind the line rays may cross: their tube is held
+        lit[i, 3] = max(value(spreading[j], t), 0.05)
     misfit = np.zeros(max(driven, 1))
     drive(k, soft, driven, mid, lit, local, oblique, c, lane, g, misfit)
     return np.max(misfit)
@@ -166,14 +159,14 @@ def load_waves(
     first = np.sqrt(lit[0, 3]) * np.exp(1j * k * (lit[0, 1] - square * along))
     for j in range(len(nodes)):
         height, rate = levels[0, j], levels[1, j]
-        tube = max(1.0 + lit[0, 2] * height, LEAST_TUBE)
+        tube = max(1.0 + lit[0, 2] * height, 0.2)
         widening = 0.5 * lit[0, 2] * rate / tube
         y = u[j, 0] * fade[j, 0] * first * np.sqrt(tube)
         slope = u[j, 1] / cosine * fade[j, 0] + u[j, 0] * (fade[j, 1] + widening * fade[j, 0])
         slope *= first * np.sqrt(tube) * scale
         wave[2 * j, lane], wave[2 * j, LANES + lane] = y.real, y.imag
         wave[2 * j + 1, lane], wave[2 * j + 1, LANES + lane] = slope.real, slope.imag
-        tube = max(1.0 + lit[last, 2] * height, LEAST_TUBE)
+        tube = max(1.0 + lit[last, 2] * height, 0.2)
         y = np.sqrt(lit[last, 3] * tube) * np.exp(1j * k * (lit[last, 1] + nodes[j] * q))
         slope = scale * (1j * k * q + 0.5 * lit[last, 2] * rate / tube) * y
         incident[2 * j, lane], incident[2 * j, LANES + lane] = y.real, y.imag
@@ -187,7 +180,7 @@ def reflected(k, soft, s, cubics, curve, transverse, eta, start, stop, nodes, ou
     cubics and curve are those of `ray_profile`, transverse and eta the cubics of kappa_t and of the admittance; rays
     come from places between ``stop`` and ``start``.
     """
-    apart = nodes[-1] - nodes[-2]
+    apart, most = nodes[-1] - nodes[-2], 0.05 * (start - stop)
     psi, x0, y0 = 0.0, 0.0, 0.0
     h0, f0, a0, s0 = 0.0, 0.0, 0j, 0.0
     at, step = start, 0.0
@@ -208,11 +201,11 @@ def reflected(k, soft, s, cubics, curve, transverse, eta, start, stop, nodes, ou
         dx, dy = x0 - x, y0 - y
         length = (dx * np.cos(psi) + dy * np.sin(psi)) / forward if forward > 0.0 else -1.0
         h = (x + length * rx - x0) * np.sin(psi) - (y + length * ry - y0) * np.cos(psi)
-        meets = c > LEAST_COSINE and forward > LEAST_FORWARD and length >= 0.0 and (first or h > h0)
+        meets = c > 1e-3 and forward > LEAST_FORWARD and length >= 0.0 and (first or h > h0)
         if not first and (not meets or h - h0 > apart):
             # towards the last ray that meets the line, or to the next height
             step *= 0.5
-            if step < LEAST * (start - stop):
+            if step < 2e-5 * most:
                 break
             continue
         if not meets:
@@ -221,7 +214,7 @@ def reflected(k, soft, s, cubics, curve, transverse, eta, start, stop, nodes, ou
         tube /= max(1.0 + 2.0 * length * value(transverse[i], t) * c, 0.05)
         local = value(eta[i], t)
         a1 = (-1.0 + 0j if soft else (c - local) / (c + local)) * np.sqrt(tube)
-        part = min(1.0, max(0.0, (forward - LEAST_FORWARD) / (FORWARD - LEAST_FORWARD)))
+        part = min(1.0, max(0.0, (forward - LEAST_FORWARD) / (0.2 - LEAST_FORWARD)))
         a1 *= part * part * part * (10.0 - 15.0 * part + 6.0 * part * part)
         f1, s1 = x + length, rx * np.sin(psi) - ry * np.cos(psi)
         d = h - h0
@@ -233,11 +226,11 @@ def reflected(k, soft, s, cubics, curve, transverse, eta, start, stop, nodes, ou
             out[node, 0], out[node, 1] = u, 1j * k * ((1 - w) * s0 + w * s1) * u
             node += 1
         if first:
-            step = min(FIRST * apart, LARGEST * (start - stop))
+            step = min(0.1 * apart, most)
         else:
             at = there
             if d < 0.4 * apart:
-                step = min(2 * step, LARGEST * (start - stop))
+                step = min(2 * step, most)
         h0, f0, a0, s0, first = h, f1, a1, s1, False
     for j in range(node, len(nodes)):
         out[j, 0], out[j, 1] = 0j, 0j

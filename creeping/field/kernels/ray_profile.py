@@ -38,14 +38,8 @@ from creeping.kernels.block import BLOCK, entry_options, options, strict_options
 from creeping.kernels.exponential import wave
 
 _x, _w = np.polynomial.legendre.leggauss(4)
-NODES, WEIGHTS = tuple(float(x) for x in (_x + 1) / 2), tuple(float(w) for w in _w / 2)
-I1, I2, I3, I4, U1, U2, RATE1, RATE2, R1, R2, BEND1, BEND2, LANES = range(13)
-"""Numbers of a ray: integrals, (2 κ)^(1/3) at both ends, 0 where κ <= 0, ρ', and r and ρρ'', 0 where κ <= 0."""
-TAU, RESIDUE, PLAIN, ACROSS, VARYING, ENDS, SLOPE, SLOPE_ACROSS, BENT, CONSTANTS = range(10)
-"""Numbers of a mode: τ, R, the parts of c, a, those of ∂c/∂τ, and M0²/60."""
-MOST_OF_DECAY, MOST_CHANGE = 0.5, 2.0
-"""Bounds of the second order: of |δ| in parts of ξ|τ|, and of what A adds to 1."""
-_FACTOR = 2 * math.sqrt(math.pi)
+GAUSS = tuple((float(x), float(w)) for x, w in zip((_x + 1) / 2, _w / 2, strict=True))
+"""Places and weights on an interval of length 1."""
 STEEPEST = 0.6
 """Height of a point above the tangent plane at a foot, over its distance: beyond, it is on another side of a body."""
 SPAN = 16
@@ -95,9 +89,9 @@ def displacement(c, psi, t):
     """Displacement (along, across) from a node to t behind it."""
     along, across = 0.0, 0.0
     for j in range(4):
-        a = angle(c, psi, NODES[j] * t)
-        along += WEIGHTS[j] * np.cos(a)
-        across += WEIGHTS[j] * np.sin(a)
+        a = angle(c, psi, GAUSS[j][0] * t)
+        along += GAUSS[j][1] * np.cos(a)
+        across += GAUSS[j][1] * np.sin(a)
     return along * t, across * t
 
 
@@ -161,8 +155,10 @@ def mode_orders(rays, modes, k, transverse_weight, beta, start, stop, out):
 
     Parameters
     ----------
-    rays : (LANES, n), n a multiple of BLOCK
-    modes : (m, CONSTANTS, 2)
+    rays : (12, n), n a multiple of BLOCK
+        I_1 to I_4; of both ends (2 κ)^(1/3), 0 where κ <= 0, ρ', and r and ρρ'', 0 where κ <= 0.
+    modes : (m, 9, 2)
+        τ, R, the three parts of c, a, the two of ∂c/∂τ, and M0²/60.
     k : float, 1/L
     transverse_weight, beta : float
         ω and β.
@@ -179,29 +175,29 @@ def mode_orders(rays, modes, k, transverse_weight, beta, start, stop, out):
         at = block * BLOCK
         for i in range(BLOCK):
             j = at + i
-            v1, v2 = rays[U1, j] * root, rays[U2, j] * root
+            v1, v2 = rays[4, j] * root, rays[5, j] * root
             w1, w2 = 0.5 * v1 * v1, 0.5 * v2 * v2
-            xi[i] = s * rays[I1, j]
-            by1[i], by2[i], by3[i] = rays[I2, j] / s, rays[I3, j] / s, rays[I4, j] / s
-            ends[i] = (rays[RATE2, j] * v2 - rays[RATE1, j] * v1) / 12.0
+            xi[i] = s * rays[0, j]
+            by1[i], by2[i], by3[i] = rays[1, j] / s, rays[2, j] / s, rays[3, j] / s
+            ends[i] = (rays[7, j] * v2 - rays[6, j] * v1) / 12.0
             a0[i] = w1 + w2
-            a1[i] = w1 * rays[R1, j] + w2 * rays[R2, j]
-            a3[i] = w1 * rays[BEND1, j] + w2 * rays[BEND2, j]
+            a1[i] = w1 * rays[8, j] + w2 * rays[9, j]
+            a3[i] = w1 * rays[10, j] + w2 * rays[11, j]
             a2[i] = transverse_weight * a1[i] + beta * a3[i]
             for q in range(4):
                 sums[q, i] = 0.0
         for p in range(modes.shape[0]):
             # real and imaginary parts of the constants
-            tr, ti = modes[p, TAU, 0], modes[p, TAU, 1]
-            rr, ri = modes[p, RESIDUE, 0], modes[p, RESIDUE, 1]
-            pr, pi = modes[p, PLAIN, 0], modes[p, PLAIN, 1]
-            cr, ci = modes[p, ACROSS, 0], modes[p, ACROSS, 1]
-            vr, vi = modes[p, VARYING, 0], modes[p, VARYING, 1]
-            er, ei = modes[p, ENDS, 0], modes[p, ENDS, 1]
-            sr, si = modes[p, SLOPE, 0], modes[p, SLOPE, 1]
-            xr, xim = modes[p, SLOPE_ACROSS, 0], modes[p, SLOPE_ACROSS, 1]
-            br, bi = modes[p, BENT, 0], modes[p, BENT, 1]
-            most2 = MOST_OF_DECAY * MOST_OF_DECAY * (tr * tr + ti * ti)
+            tr, ti = modes[p, 0, 0], modes[p, 0, 1]
+            rr, ri = modes[p, 1, 0], modes[p, 1, 1]
+            pr, pi = modes[p, 2, 0], modes[p, 2, 1]
+            cr, ci = modes[p, 3, 0], modes[p, 3, 1]
+            vr, vi = modes[p, 4, 0], modes[p, 4, 1]
+            er, ei = modes[p, 5, 0], modes[p, 5, 1]
+            sr, si = modes[p, 6, 0], modes[p, 6, 1]
+            xr, xim = modes[p, 7, 0], modes[p, 7, 1]
+            br, bi = modes[p, 8, 0], modes[p, 8, 1]
+            most2 = 0.25 * (tr * tr + ti * ti)
             for i in range(BLOCK):
                 lr, li = xi[i] * tr, xi[i] * ti
                 cosine, sine = wave(-li, lr)
@@ -213,7 +209,7 @@ def mode_orders(rays, modes, k, transverse_weight, beta, start, stop, out):
                 cosine, sine = wave(-(li + held * di), lr + held * dr)
                 fr = sr * a0[i] + xr * a1[i] + tr * a2[i] - br * a3[i]
                 fi = si * a0[i] + xim * a1[i] + ti * a2[i] - bi * a3[i]
-                held = _held(fr * fr + fi * fi, MOST_CHANGE * MOST_CHANGE)
+                held = _held(fr * fr + fi * fi, 4.0)
                 fr, fi = 1.0 + held * fr, held * fi
                 gr, gi = rr * fr - ri * fi, rr * fi + ri * fr
                 sums[2, i] += gr * cosine - gi * sine
@@ -221,8 +217,8 @@ def mode_orders(rays, modes, k, transverse_weight, beta, start, stop, out):
         for i in range(BLOCK):
             for q in range(2):
                 # times 2i√π
-                out[2 * q, at + i] = -_FACTOR * sums[2 * q + 1, i]
-                out[2 * q + 1, at + i] = _FACTOR * sums[2 * q, i]
+                out[2 * q, at + i] = -2.0 * math.sqrt(math.pi) * sums[2 * q + 1, i]
+                out[2 * q + 1, at + i] = 2.0 * math.sqrt(math.pi) * sums[2 * q, i]
 
 
 @njit(**strict_options)

@@ -4,8 +4,8 @@
     mode 2   I_j = int l_j grad_x G dS             G = e^{ikR}/R,   R = |x - y|
 
 A tile is a square of 0 <= u, v <= 1 on which x, x_u and x_v are polynomials. It is halved until its parts are no larger
-than their distance from x; each is integrated by Gauss's rule. Parts that have been halved up to KEPT times along u and
-v serve all points. About a node of its own, polar coordinates in the tangent plane take the singularity away, from the
+than their distance from x; each is integrated by Gauss's rule. Parts that have been halved up to twice along u and v
+serve all points. About a node of its own, polar coordinates in the tangent plane take the singularity away, from the
 node to each of the four sides.
 
 Also here: those of mode 2 for a current that is tangent to the tile. With J_f = sum_j l_j(y_f) [q_j - n_f (n_f.q_j)] at
@@ -24,17 +24,6 @@ from numba import njit
 
 from creeping.kernels.block import entry_options, options, strict_options
 from creeping.kernels.exponential import cosine_sine
-
-WAITING = 400
-"""Parts of a tile that wait, at most."""
-KEPT, SLOTS = 2, 49
-"""Halvings of parts that are kept, and how many such parts there are: (2^(KEPT + 1) - 1)^2."""
-DEEPEST = 12
-"""Halvings at most."""
-BESIDE = 1e-7
-"""Distance of a point from a side, over its length, up to which it is on it."""
-LONG = 1.6
-"""Ratio of the sides of a part from which only the longer one is halved."""
 
 
 @njit(**strict_options)
@@ -165,8 +154,8 @@ def _around(table, grid, bary, u0, v0, angles, share, radii, weight, room, by, a
         low, high = p0 * t0 + q0 * t1, p1 * t0 + q1 * t1
         far = p0 * t1 - q0 * t0
         # next to a side the triangle between is so thin that rounding is all that would be integrated
-        thin = 0.0 if far < BESIDE * length else 1.0
-        far = max(far, BESIDE * length)
+        thin = 0.0 if far < 1e-7 * length else 1.0
+        far = max(far, 1e-7 * length)
         # places along the side are far sinh(w): as many points next to the node's foot as far along a long side
         first, last = math.asinh(low / far), math.asinh(high / far)
         for a in range(angles.shape[0]):
@@ -210,12 +199,14 @@ def tile_rows(
     n, p, g = grid.shape[0], nodes_u.shape[0], rule.shape[0]
     polar = 4 * angles.shape[0] * radii.shape[0]
     room = (np.empty((max(g, 1), n)), np.empty((max(g, 1), n)), np.empty(9))
-    made = np.zeros(SLOTS + 1, dtype=np.bool_)
-    by, spots = np.empty((SLOTS + 1, 6, g * g)), np.empty((SLOTS + 1, 5))
-    by_u, by_v = np.empty((SLOTS + 1, g, p)), np.empty((SLOTS + 1, g, p))
+    # parts of up to two halvings along u and v, (2^3 - 1)^2 of them, and one of more
+    slots = 49
+    made = np.zeros(slots + 1, dtype=np.bool_)
+    by, spots = np.empty((slots + 1, 6, g * g)), np.empty((slots + 1, 5))
+    by_u, by_v = np.empty((slots + 1, g, p)), np.empty((slots + 1, g, p))
     terms, total = np.empty((6, max(polar, g * g))), np.empty((6, p, p))
     around, at, one_u, one_v = np.empty((6, polar)), np.empty((2, polar)), np.empty(p), np.empty(p)
-    stack = np.empty((WAITING, 4), dtype=np.int64)
+    stack = np.empty((400, 4), dtype=np.int64)
     kinds = 3 if mode == 2 else mode + 1
     for t in range(first, last):
         table = tables[t]
@@ -244,22 +235,23 @@ def tile_rows(
                     waiting -= 1
                     # halvings along u and v, and which of the parts it is
                     lu, lv, iu, iv = stack[waiting, 0], stack[waiting, 1], stack[waiting, 2], stack[waiting, 3]
-                    slot = SLOTS
-                    if lu <= KEPT and lv <= KEPT:
+                    slot = slots
+                    if lu <= 2 and lv <= 2:
                         slot = ((1 << lu) - 1 + iu) * 7 + (1 << lv) - 1 + iv
-                    if slot == SLOTS or not made[slot]:
+                    if slot == slots or not made[slot]:
                         width, height = 1.0 / (1 << lu), 1.0 / (1 << lv)
                         box = (iu * width, (iu + 1) * width, iv * height, (iv + 1) * height)
                         _part(
                             table, grid, bary, nodes_u, weights_u, nodes_v, weights_v, rule, share, box, room, by[slot],
                             by_u[slot], by_v[slot], spots[slot],
                         )  # fmt: skip
-                        made[slot] = slot < SLOTS
+                        made[slot] = slot < slots
                     spot = spots[slot]
                     away = (x[0] - spot[0]) ** 2 + (x[1] - spot[1]) ** 2 + (x[2] - spot[2]) ** 2
                     size = max(spot[3], spot[4])
-                    if away < (apart * size) ** 2 and max(lu, lv) < DEEPEST and waiting < WAITING - 4:
-                        by_both = spot[3] <= LONG * spot[4] and spot[4] <= LONG * spot[3]
+                    if away < (apart * size) ** 2 and max(lu, lv) < 12 and waiting < 396:
+                        # of a long part only the longer side is halved
+                        by_both = spot[3] <= 1.6 * spot[4] and spot[4] <= 1.6 * spot[3]
                         halve_u, halve_v = int(by_both or spot[3] > spot[4]), int(by_both or spot[4] > spot[3])
                         for a in range(1 + halve_u):
                             for b in range(1 + halve_v):

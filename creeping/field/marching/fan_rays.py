@@ -45,20 +45,8 @@ from creeping.geometry.surface import normal, project, size
 from creeping.rays.fan import RayFan
 from creeping.rays.strips import Strip, strip_rows
 
-TURN = 0.03
-"""Radians that the body turns by between two nodes, at the largest curvature along rays."""
-FEWEST, MOST = 40, 2000
-"""Nodes of either way."""
-BEHIND = np.radians(80.0)
-"""Angle by which rays turn behind the line, in the median: the march starts at 75 degrees at most."""
-RTOL = 1e-10
-FLAT, LEAST_SPREADING = 0.3, 0.1
-"""Share of the first curvature at which Lambda begins to fade, and |J| below which it does not grow like 1/J."""
-MOST_BENT = 6.0
-"""Bound of (J'/2J)^2 in V, in terms of the body's size; in the shadow it belongs to the spreading of beams."""
-
-OWN = 1e-12
-"""Relative tolerance of the way from the lattice to a joint."""
+FLAT = 0.3
+"""Share of the first curvature at which Lambda begins to fade."""
 
 
 def fan_profiles(fan: RayFan, boundary: Boundary) -> RayProfiles:
@@ -89,19 +77,21 @@ def fan_profiles(fan: RayFan, boundary: Boundary) -> RayProfiles:
     jointed = is_piecewise(body)
     # beyond a joint rays may be straighter than their neighbours
     typical = np.max if jointed else np.median
-    back = float(typical(BEHIND / np.maximum(kappa, least)))
+    # the march starts at 75 degrees at most
+    back = float(typical(np.radians(80.0) / np.maximum(kappa, least)))
     sharpest = max(float(np.max(np.abs(fan.curvature))), least)
     ways = []
     for way, sense in ((back, -1.0), (fan.length, 1.0)):
-        count = int(np.clip(np.ceil(way * sharpest / TURN), FEWEST, MOST))
+        # the body turns by 0.03 between two nodes where it is most curved
+        count = int(np.clip(np.ceil(way * sharpest / 0.03), 40, 2000))
         times = np.linspace(0, way, count + 1)
         begin = pack(x0, sense * p0, jacobi=True)
         if jointed:
-            found = jointed_rays(body, begin, times, rtol=RTOL)
+            found = jointed_rays(body, begin, times, rtol=1e-10)
             own, states = found.times, found.states
             nodes = piece_nodes(body, states[..., X].reshape(-1, 3), found.pieces.ravel())
         else:
-            states = trace_states(body, begin, times, rtol=RTOL)
+            states = trace_states(body, begin, times, rtol=1e-10)
             own, x = np.broadcast_to(times, states.shape[:2]), states[..., X].reshape(-1, 3)
             nodes = nodes_at(body, x, normal(body, x))
         ways.append(_along(d, x0, sense * own, nodes, states, sense, boundary))
@@ -109,7 +99,8 @@ def fan_profiles(fan: RayFan, boundary: Boundary) -> RayProfiles:
     whole = {name: np.concatenate([first[name][:, :0:-1], second[name]], axis=1) for name in first}
     gauss = whole["curvature"] * whole["transverse"] - whole["torsion"] ** 2
     bent = (whole["rate"] / (2 * np.maximum(np.abs(whole["spreading"]), 1e-9))) ** 2
-    bent = np.where(whole["s"] < 0, np.minimum(bent, MOST_BENT / size(body) ** 2), 0.0)
+    # bounded; in the shadow it belongs to the spreading of beams
+    bent = np.where(whole["s"] < 0, np.minimum(bent, 6 / size(body) ** 2), 0.0)
     return RayProfiles(
         **{name: whole[name] for name in ("s", "curvature", "transverse", "spreading", "torsion", "phase", "climb")},
         admittance=whole.get("admittance"),
@@ -161,7 +152,8 @@ def _lean(fan: RayFan, whole: dict[str, Any]) -> FloatArray:
     slope = whole["climb"] ** 2 + whole["aside"] ** 2
     out[:, lit] = (-whole["aside"] * (1 + whole["forward"]) / np.maximum(slope, 1e-300))[:, lit]
     out[:, start] = on_line
-    inverse = J / (J**2 + LEAST_SPREADING**2 * np.exp(-((J / LEAST_SPREADING) ** 2)))
+    # 1/J, but where |J| < 0.1
+    inverse = J / (J**2 + 0.01 * np.exp(-((10 * J) ** 2)))
     late = np.repeat(on_line[:, None], s.shape[1] - start - 1, axis=1)
     for strip, mine in zip(fan_strips(fan), wide_rows(fan), strict=True):
         at = np.minimum(s[mine][:, shadow], strip.times[-1])
@@ -286,7 +278,7 @@ def _ray(
         piece = int(np.asarray(body.piece(ahead[None]))[0])
         if high < times[-1]:
             step = np.array([high - knots[-1]])
-            after = trace_own(pieces_of(body)[piece], known[-1:, :WITH_JACOBI], step, rtol=min(rtol, OWN))[0]
+            after = trace_own(pieces_of(body)[piece], known[-1:, :WITH_JACOBI], step, rtol=min(rtol, 1e-12))[0]
         else:
             after = states[-1]
         known, knots = np.concatenate([known, [after]]), np.append(knots, high)

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
-from scipy.interpolate import RectBivariateSpline
+from scipy.interpolate import RectBivariateSpline, make_interp_spline
 
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
@@ -30,11 +30,10 @@ from creeping.field.marching.fan_rays import FLAT, fan_profiles, wide_rows
 from creeping.field.marching.layer import MarchedRays, march_rays
 from creeping.field.marching.plan import MarchStatus
 from creeping.field.results.point_result import columns_of
-from creeping.field.waves.beams import STRONG, Components, beams_beside_rays, blended_sum, variation, wide
+from creeping.field.waves.beams import MOST_TURNED, Components, beams_beside_rays, blended_sum, variation, wide
 from creeping.field.waves.far_geometry import fan_strips
-from creeping.field.waves.gaussian_beams import MOST_TURNED
-from creeping.field.waves.ray_sums import RaySum
-from creeping.field.waves.strip_waves import StripTable, around, modes_on_strip
+from creeping.field.waves.ray_sums import RaySum, own_error
+from creeping.field.waves.surface import surface_waves
 from creeping.geometry.piecewise import has_edges, is_piecewise
 from creeping.geometry.surface import Surface, memo_of
 from creeping.rays.ends import AT_CREASES, RayStatus
@@ -43,17 +42,83 @@ from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays
 from creeping.rays.strips import Strip
 
-KEPT = 2
-"""Marches kept with a fan, of so many wavenumbers and boundaries."""
-FEWEST = 64
-"""Steps at least that are kept of a ray."""
-FEWEST_RAYS = 8
-"""Rays of a strip from which waves are interpolated between them."""
 TWISTED = 0.4
 """Error of y, as a share of it, by the root of what the twist adds to its phase."""
 FAVOUR = {"electric hard": 0.5}
 """How much more the error of modes counts than that of the march, 1 if not named: measured against the equation on
 three ellipsoids and a sphere, k = 10 and 20, among 0.05 to 2."""
+
+
+@dataclass(frozen=True, eq=False)
+class StripTable:
+    """A complex function on strips.
+
+    Attributes
+    ----------
+    strips : tuple of Strip
+    times : (steps,), L
+        At which it is kept.
+    values : list of (rays, steps) complex
+        Of each strip's rays.
+    """
+
+    strips: tuple[Strip, ...]
+    times: FloatArray
+    values: list[ComplexArray]
+
+    def at(self, strip: int, sigma: FloatArray, s: FloatArray, *, dsigma: int = 0, ds: int = 0) -> ComplexArray:
+        """The function, or a derivative of it, at places (n,) of a strip: (n,)."""
+        real, imaginary = self._splines[strip]
+        sigma = self.strips[strip].wrap(sigma)
+        return np.asarray(real.ev(sigma, s, dx=dsigma, dy=ds) + 1j * imaginary.ev(sigma, s, dx=dsigma, dy=ds))
+
+    @cached_property
+    def _splines(self) -> list[tuple[RectBivariateSpline, RectBivariateSpline]]:
+        """Splines of the real and the imaginary part on each strip."""
+        found = []
+        for strip, table in zip(self.strips, self.values, strict=True):
+            places, values = around(strip, table)
+            degree = min(3, len(places) - 1)
+            real, imaginary = (
+                RectBivariateSpline(places, self.times, part, kx=degree) for part in (values.real, values.imag)
+            )
+            found.append((real, imaginary))
+        return found
+
+
+def around(strip: Strip, values: Any) -> tuple[FloatArray, Any]:
+    """Places of a strip's rays and values (rays, ...) there, with some beyond either end of a closed one."""
+    places = strip.positions
+    if not strip.closed:
+        return places, values
+    count = len(places)
+    # six rays more at either end
+    turns = np.arange(-min(6, count), count + min(6, count))
+    return places[turns % count] + strip.period * (turns // count), values[turns % count]
+
+
+def without_tubes(rays: RayPoints) -> RayPoints:
+    """Points of rays whose J is 1, so that their wave is y but for its phase."""
+    lanes = rays.lanes.copy()
+    lanes[..., 6:9] = 1.0, 0.0, 0.0
+    return RayPoints(lanes, rays.starts, rays.time, rays.alive, rays.scale)
+
+
+def resampled(strip: Strip, values: ComplexArray, times: FloatArray) -> ComplexArray:
+    """Values (rays, steps) of a strip's own steps at other times (m,), L: (rays, m)."""
+    return np.asarray(make_interp_spline(strip.times, values, k=3, axis=1)(times))
+
+
+def modes_on_strip(strip: Strip, times: FloatArray, k: float, kind: Boundary) -> tuple[ComplexArray, FloatArray]:
+    """Y of creeping modes on a strip's rays and its error (rays, steps), infinite where they have ended."""
+    rays = strip.rays
+    plain = without_tubes(rays)
+    waves = surface_waves(plain, k, kind, 2), surface_waves(plain, k, kind, 1)
+    error = np.where(rays.alive, own_error(plain, waves, k, kind, 2), np.inf)
+    y = resampled(strip, waves[0] * np.exp(-1j * k * rays.eikonal), times)
+    # the larger of the steps about a place tells
+    at = np.clip(np.searchsorted(strip.times, times), 1, len(strip.times) - 1)
+    return y, np.maximum(error[:, at], error[:, at - 1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +258,7 @@ def march_alone(body: Surface, boundary: Boundary) -> bool:
     return boundary.varies or (is_piecewise(body) and not has_edges(body))
 
 
-def marchable(fan: RayFan, boundary: Boundary, order: int, fewest: int = FEWEST_RAYS) -> bool:
+def marchable(fan: RayFan, boundary: Boundary, order: int, fewest: int = 8) -> bool:
     """Whether the waves of a fan can be marched, with at least so many rays on each of its strips."""
     strips = fan_strips(fan)
     return (
@@ -214,12 +279,12 @@ def fan_waves(fan: RayFan, *, wavenumber: float, boundary: Boundary) -> FanWaves
 
     def make() -> FanWaves:
         marched = march_rays(fan_profiles(fan, boundary), wavenumber=wavenumber, boundary=boundary)
-        times = np.linspace(0.0, fan.length, int(np.max(marched.counts, initial=FEWEST)) + 1)
+        times = np.linspace(0.0, fan.length, int(np.max(marched.counts, initial=64)) + 1)
         ends = np.where(np.isin(fan.status, AT_CREASES), fan.detachment, np.inf)
         alone = march_alone(fan.body, boundary)
         return FanWaves(fan_strips(fan), wide_rows(fan), marched, times, boundary, alone, ends)
 
-    return memo_of(fan, "marched waves", (wavenumber, boundary), make, KEPT)
+    return memo_of(fan, "marched waves", (wavenumber, boundary), make, 2)
 
 
 class OnRays(NamedTuple):
@@ -279,7 +344,8 @@ def marched_sums(
     eta, found = variation(fan, shed, y, slope, k), []
     for wave, size, part, *beams in zip(*(columns_of(one) for one in (own, of.size, of.part)), *sides, strict=True):
         strength = np.abs(tube) * size
-        bounded = np.minimum(strength, STRONG * size)
+        # on a caustic a ray is no stronger than its neighbours
+        bounded = np.minimum(strength, 1.5 * size)
         found.append(
             blended_sum(fan, shed, wave, strength, bounded, part, eta, (beams[0], beams[1]), k, waves.boundary)
         )

@@ -4,17 +4,21 @@ With L = (2 rho^2/k)^(1/3) and m = (k rho/2)^(1/3) at the shadow line, delta = (
 the tangent to d, and psi that by which it has turned away behind the line:
 
     start     kappa > 0 and sin^3(alpha)/kappa largest for alpha of 50..75 degrees: optics is best there
-    switch    the last place with psi < min(TURN/m, 60 degrees) before psi = 100 degrees
+    switch    the last place with psi < min(1/m, 60 degrees) before psi = 100 degrees
     steps     0.12 L, in the driven part at most 0.3 wavelengths
     height    20 delta; over flatter ground max(20 delta, min(14 delta(kappa_min), 6 sqrt(flat length/k)))
     elements  0.2 delta(kappa_max) on the surface growing to min(0.6 delta, 1.3/(k sin alpha))
+    twist     up to 8 delta
 
-Heights and elements are rounded to powers of numbers, towards the finer grid, so that rays share grids. So are caps,
-to the nearest: none is finer, a low one takes the body's shape from the wave and a high one may fold the layer.
+Heights and elements are rounded to powers of 1.35 and 1.2, towards the finer grid, so that rays share grids: closer
+ones fill fewer lanes. So are caps, of 1.04, to the nearest: none is finer, a low one takes the body's shape from the
+wave and a high one may fold the layer. A cap off by 5 % costs the penumbra before a concave surface half of its
+accuracy where k over the curvature is 20.
 
 Sources: [C93]; Derivations, F22.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -23,32 +27,12 @@ import numpy as np
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.field.marching.profile import CAP, KEPT_BELOW, GridSpec, RayProfiles
 
-PROBES = 512
-"""Places of a ray at which it is looked at,"""
-COARSER = 2
-"""and of how many of them one is, for dips."""
-START = (np.radians(75.0), np.radians(50.0))
-LEAST_START = np.radians(20.0)
-"""Angle to d below which a start is no start: optics has no value there."""
-TURN, MOST_TURN = 1.0, np.radians(60.0)
 AWAY = np.radians(100.0)
-STEP, LIT_STEP = 0.12, 0.3
-HEIGHT, FLAT_HEIGHT, FLAT_PATH = 20.0, 14.0, 6.0
-ELEMENT, SLANTED, FIRST = 0.6, 1.3, 0.2
-TWISTED = 8.0
+"""Angle behind the line at which a ray has turned away for good."""
 FLAT = 0.3
 """Share of the curvature at the shadow line below which ground is flat."""
 LEAST_CURVATURE = 0.05
 """Share of the largest curvature that scales are taken from at least."""
-CAPS, ELEMENTS, HEIGHTS = 1.04, 1.2, 1.35
-"""Ratios of neighbouring caps, of longest elements, and of heights and first elements: finer ones fill fewer lanes. A
-cap off by 5 % costs the penumbra before a concave surface half of its accuracy where k over the curvature is 20."""
-BACK = 3.0
-"""Rays of optics come from so many radii of curvature behind the start at most."""
-BLUNT = 3.0
-"""k rho below which the ground is an edge to the wave."""
-STEEPEST = np.radians(50.0)
-"""Angle between tangent and chord over a dip up to which the rational step follows the wave."""
 
 
 class MarchStatus(IntEnum):
@@ -97,7 +81,7 @@ def march_plan(profiles: RayProfiles, wavenumber: float) -> MarchPlan:
     """Plan the marches of rays."""
     k, rays = wavenumber, len(profiles)
     ends = profiles.s[:, [0, -1]]
-    at = ends[:, :1] + np.linspace(0, 1, PROBES) * (ends[:, 1:] - ends[:, :1])
+    at = ends[:, :1] + np.linspace(0, 1, 512) * (ends[:, 1:] - ends[:, :1])
     look = np.stack([profiles.along(ray, at[ray]) for ray in range(rays)])
     kappa, psi = look[..., 0], look[..., 1]
     floor = LEAST_CURVATURE * np.max(np.abs(kappa), axis=1)
@@ -105,14 +89,15 @@ def march_plan(profiles: RayProfiles, wavenumber: float) -> MarchPlan:
     reference = np.maximum(np.max(edge, axis=1), floor)
     start, alpha = _starts(at, kappa, psi)
     here = np.stack([profiles.along(ray, start[ray : ray + 1])[0, 0] for ray in range(rays)])
-    stop = np.maximum(ends[:, 0], start - BACK / np.maximum(here, floor))
+    # the rays of optics come from three radii of curvature behind the start at most
+    stop = np.maximum(ends[:, 0], start - 3 / np.maximum(here, floor))
     layer = (2 / (reference**2 * k)) ** (1 / 3)
     scale = (k / (2 * reference)) ** (1 / 3)
     past = (at >= 0) & (np.cumsum((at >= 0) & (psi > AWAY), axis=1) == 0)
-    turned = past & (psi < np.minimum(TURN / scale, MOST_TURN)[:, None])
+    turned = past & (psi < np.minimum(1 / scale, np.radians(60.0))[:, None])
     switch = _at_last(at, turned)
-    step = STEP * layer
-    steps = np.stack([np.minimum(step, LIT_STEP * 2 * np.pi / k), step], axis=1)
+    step = 0.12 * layer
+    steps = np.stack([np.minimum(step, 0.3 * 2 * np.pi / k), step], axis=1)
     served = at >= start[:, None]
     # the second half of a closed way decides no height: what comes there has decayed
     ahead = (at >= 0) & (at < 0.65 * ends[:, 1:])
@@ -120,36 +105,23 @@ def march_plan(profiles: RayProfiles, wavenumber: float) -> MarchPlan:
     lowest = np.min(np.where(served, kappa, np.inf), axis=1)
     most = np.maximum(np.max(np.where(served, kappa, -np.inf), axis=1), reference)
     flat = np.mean((at >= 0) & (kappa < FLAT * reference[:, None]), axis=1) * (ends[:, 1] - ends[:, 0])
-    height = HEIGHT * _delta(k, reference)
-    wide = np.minimum(FLAT_HEIGHT * _delta(k, np.maximum(least, 0.2 * floor)), FLAT_PATH * np.sqrt(flat / k))
-    height = _rounded(np.maximum(height, wide), k, HEIGHTS, up=True)
-    element = _rounded(
-        np.minimum(ELEMENT * _delta(k, reference), SLANTED / (k * np.sin(np.maximum(alpha, 0.3)))), k, ELEMENTS
-    )
-    first = _rounded(FIRST * _delta(k, most), k, HEIGHTS)
-    twist = _rounded(TWISTED * _delta(k, reference), k, HEIGHTS)
-    cap = np.where(lowest < -1e-6 * most, _nearest(CAP / np.maximum(-lowest, 1e-6 * most), k, CAPS), np.inf)
+    delta = (2 * k * k * reference) ** (-1 / 3)
+    delta_least, delta_most = ((2 * k * k * of) ** (-1 / 3) for of in (np.maximum(least, 0.2 * floor), most))
+    height = np.maximum(20 * delta, np.minimum(14 * delta_least, 6 * np.sqrt(flat / k)))
+    height = _rounded(height, k, 1.35, np.ceil)
+    element = _rounded(np.minimum(0.6 * delta, 1.3 / (k * np.sin(np.maximum(alpha, 0.3)))), k, 1.2, np.floor)
+    first, twist = _rounded(0.2 * delta_most, k, 1.35, np.floor), _rounded(8 * delta, k, 1.35, np.floor)
+    cap = _rounded(CAP / np.maximum(-lowest, 1e-6 * most), k, 1.04, np.round)
+    cap = np.where(lowest < -1e-6 * most, cap, np.inf)
     status, reliable = _status(k, at, look, start, alpha, cap, served)
-    specs = [
-        GridSpec(float(a), float(b), float(c), float(d), float(e), float(k))
-        for a, b, c, d, e in zip(height, element, first, cap, twist, strict=True)
-    ]
+    rows = np.stack([height, element, first, cap, twist], axis=1).tolist()
+    specs = [GridSpec(a, b, c, d, e, k) for a, b, c, d, e in rows]
     return MarchPlan(start, stop, switch, steps, specs, status, reliable)
 
 
-def _delta(k: float, kappa: FloatArray) -> FloatArray:
-    return (2 * k * k * kappa) ** (-1 / 3)
-
-
-def _rounded(length: FloatArray, k: float, lattice: float, *, up: bool = False) -> FloatArray:
+def _rounded(length: FloatArray, k: float, lattice: float, to: Callable[..., FloatArray]) -> FloatArray:
     """Lengths (rays,) on a lattice that does not depend on their unit."""
-    steps = np.log(k * length) / np.log(lattice)
-    return np.asarray(lattice ** (np.ceil(steps) if up else np.floor(steps)) / k)
-
-
-def _nearest(length: FloatArray, k: float, lattice: float) -> FloatArray:
-    """The same, the nearest ones."""
-    return np.asarray(lattice ** np.round(np.log(k * length) / np.log(lattice)) / k)
+    return np.asarray(lattice ** to(np.log(k * length) / np.log(lattice)) / k)
 
 
 def _at_last(at: FloatArray, mask: BoolArray) -> FloatArray:
@@ -163,7 +135,9 @@ def _starts(at: FloatArray, kappa: FloatArray, psi: FloatArray) -> tuple[FloatAr
     rows = np.arange(len(at))
     alpha = np.where(at < 0, np.arccos(np.cos(psi)), -1.0)
     largest = at[rows, np.argmax(alpha, axis=1)]
-    low, high = (np.where(np.any(alpha >= a, axis=1), _at_last(at, alpha >= a), largest) for a in START)
+    low, high = (
+        np.where(np.any(alpha >= a, axis=1), _at_last(at, alpha >= a), largest) for a in np.radians([75.0, 50.0])
+    )
     worth = np.sin(np.maximum(alpha, 0)) ** 3 / np.maximum(kappa, 0.1 * np.max(np.abs(kappa), axis=1, keepdims=True))
     worth = np.where((at >= low[:, None]) & (at <= high[:, None]) & (kappa > 0), worth, 0)
     best = np.where(np.max(worth, axis=1) > 0, np.argmax(worth, axis=1), np.argmin(np.abs(at - low[:, None]), axis=1))
@@ -184,7 +158,7 @@ def _status(
     status = np.full(len(at), MarchStatus.OK, dtype=np.int64)
     reliable = at[:, -1].copy()
     for ray in range(len(at)):
-        sharp = served[ray] & (kappa[ray] > k / BLUNT)
+        sharp = served[ray] & (kappa[ray] > k / 3)
         if np.any(sharp):
             status[ray], reliable[ray] = MarchStatus.SHARP, at[ray, np.argmax(sharp)]
         deep = _too_deep(at[ray], look[ray], KEPT_BELOW * cap[ray], served[ray])
@@ -193,7 +167,8 @@ def _status(
         lit = (at[ray] < 0) & (np.cumsum((np.sin(look[ray, ::-1, 1]) >= 0) & (at[ray, ::-1] < 0))[::-1] == 0)
         if np.any(lit & ~served[ray] & (kappa[ray] < -FLAT * np.max(kappa[ray]) * LEAST_CURVATURE)):
             status[ray], reliable[ray] = MarchStatus.HOLLOW, at[ray, 0]
-        if alpha[ray] < LEAST_START:
+        # optics has no value next to the line
+        if alpha[ray] < np.radians(20.0):
             status[ray], reliable[ray] = MarchStatus.UNLIT, at[ray, 0]
     return status, reliable
 
@@ -205,7 +180,7 @@ def _too_deep(s: FloatArray, look: FloatArray, depth: float, served: BoolArray) 
     """
     if not np.isfinite(depth):
         return np.inf
-    some = np.flatnonzero(served & (s >= 0))[::COARSER]
+    some = np.flatnonzero(served & (s >= 0))[::2]
     s, kappa, psi, x = s[some], look[some, 0], look[some, 1], look[some, 2:]
     tangent, normal = np.stack([np.cos(psi), np.sin(psi)], 1), np.stack([np.sin(psi), -np.cos(psi)], 1)
     for dip in np.flatnonzero((kappa[:-1] > 0) & (kappa[1:] <= 0)):
@@ -225,6 +200,7 @@ def _too_deep(s: FloatArray, look: FloatArray, depth: float, served: BoolArray) 
         rising = np.maximum.accumulate((turn < 0) & (s[i:] > s[dip]))
         landed = (towards < 0.1) | ((height < 0) & (s[i:] > s[dip])) | (rising & (turn >= 0))
         over = np.cumsum(landed) == 0
-        if np.any(over & ((height > depth) | (np.abs(turn) > STEEPEST))):
+        # the rational step follows the wave up to 50 degrees between tangent and chord
+        if np.any(over & ((height > depth) | (np.abs(turn) > np.radians(50.0)))):
             return float(s[i])
     return np.inf

@@ -14,7 +14,7 @@ Also here: cubic Hermite elements across the layer, and their matrices.
 
 Unknowns are the value and the slope (times a scale) at each height 0 = n_0 < n_1 < ... < N. With S = 1 beneath T,
 
-    S = 1 + i ABSORPTION ((n - T)/(N - T))^2 above T
+    S = 1 + 3i ((n - T)/(N - T))^2 above T
     m = n up to 0.6 c, then 0.6 c + 0.4 c tanh((n - 0.6 c)/(0.4 c)),   t = c_t tanh(n/c_t)
     M[f] = int S f v w dn,   D[f] = int f v' w'/S dn,   M_i = M[m^i],   D_i = D[m^i]
 
@@ -43,16 +43,10 @@ GIVEN = ("curvature", "transverse", "spreading", "admittance", "torsion", "lean"
 LEAST_NODES = 4
 """Nodes of a piece between two jumps: curvatures are cubics between nodes."""
 
-ABSORPTION = 3.0
 DEPTH = 0.6
 """Height of the absorber in terms of T."""
-GROWTH = 1.25
-"""Ratio of neighbouring elements from the surface on, until they have their full length: longer ones reflect."""
 KEPT_BELOW, CAP = 0.6, 0.85
 """Share of c up to which m(n) = n, and c |kappa|."""
-FADED = (0.5, 0.3)
-"""The total wave is faded out from this share of T to this share of the absorber."""
-KEPT = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,13 +255,14 @@ class LayerGrid:
     matrices: FloatArray
 
 
-@lru_cache(KEPT)
+@lru_cache(64)
 def layer_grid(spec: GridSpec) -> LayerGrid:
     """Grid of a specification."""
     nodes = _nodes(spec)
     scale = float(np.median(np.diff(nodes)))
     top = nodes[-1] - spec.height
-    cut = _fade(nodes, FADED[0] * spec.height, spec.height + FADED[1] * top) * np.array([1.0, scale])
+    # the total wave is faded out from half of T on
+    cut = _fade(nodes, 0.5 * spec.height, spec.height + 0.3 * top) * np.array([1.0, scale])
     fade = _fade(nodes, spec.height, nodes[-1])
     levels = np.stack([*_levelled(nodes, spec.cap), *_bounded(nodes, spec.twist)])
     return LayerGrid(nodes, levels, cut, fade, scale, _matrices(spec, nodes, scale))
@@ -284,7 +279,8 @@ def _nodes(spec: GridSpec) -> FloatArray:
     edges, length = [0.0], min(spec.first, element)
     while length < element:
         edges.append(edges[-1] + length)
-        length *= GROWTH
+        # longer ones next to the surface reflect
+        length *= 1.25
     below = max(1, int(np.ceil((spec.height - edges[-1]) / element)))
     straight = np.linspace(edges[-1], spec.height, below + 1)[1:]
     above = max(2, int(np.ceil(DEPTH * spec.height / element)))
@@ -327,7 +323,7 @@ def _matrices(spec: GridSpec, nodes: FloatArray, scale: float) -> FloatArray:
             one / scale * (3 * x**2 - 2 * x),
         ]
     )
-    S = 1 + 1j * ABSORPTION * np.clip((n - spec.height) / (nodes[-1] - spec.height), 0, 1) ** 2
+    S = 1 + 3j * np.clip((n - spec.height) / (nodes[-1] - spec.height), 0, 1) ** 2
     m, t = _levelled(n, spec.cap)[0], _bounded(n, spec.twist)[0]
     weight = gauss * length
     mass = [np.einsum("aeg,beg,eg->eab", v, v, weight * S * f) for f in (1, m, m**2, t**2)]

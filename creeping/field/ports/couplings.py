@@ -1,6 +1,6 @@
 """The field at each of many ports on a body of a unit source at each other: all geodesics between them.
 
-    value_ij = sum over geodesics of the waves of `creeping.field.ports.path_waves`, or beams where these merge
+    value_ij = sum over geodesics of the waves of `creeping.field.ports.tensor`, or beams where these merge
 
 Ports are numbered slots first. By reciprocity (i, j) and (j, i) are equal; between a slot and a monopole they are
 opposite, H_ji = -E_ij. Their error is that of a point source's waves, and what was not derived.
@@ -18,14 +18,13 @@ import numpy as np
 
 from creeping._typing import Any, ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
+from creeping.field.airy import hard_modes
 from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import BoundaryLike, boundary_name, scalar_boundaries
 from creeping.field.ports.coupling_result import Coupling
-from creeping.field.ports.path_waves import path_waves
 from creeping.field.ports.sums import port_sums
-from creeping.field.ports.tensor import TENSORS
+from creeping.field.ports.tensor import TENSORS, path_waves
 from creeping.field.results.point_result import FieldStatus
-from creeping.field.special.airy import hard_modes
 from creeping.geodesics.equations import points_of_charts
 from creeping.geodesics.states import as_points, on_body
 from creeping.geometry.arguments import checked_body, positive_number, real_array
@@ -35,14 +34,8 @@ from creeping.geometry.surface import Surface, normal, size
 from creeping.rays.port_rays import PortRays, rays_between
 from creeping.rays.reach import AUTO
 
-DECAY, GIRTHS = 13.0, (0.65, 1.2)
-"""Exponent by which the wave falls along geodesics of length "auto", and bounds of that in girths of the body."""
 CLOSEST = 1e-6
 """Least distance of ports, in body sizes."""
-NEAR = 2.0
-"""How far from a caustic a port is close to it, in terms of (a/k^2)^(1/3)."""
-FLAT = 1e-3
-"""Least tangential part of an axis, as a share of it: below it is rounding of the normal, not a direction."""
 Length = float | Literal["auto"]
 Wavenumbers = Sequence[float] | FloatArray
 
@@ -408,7 +401,8 @@ def _tangential(axes: ArrayLike, normals: FloatArray) -> FloatArray:
     long = np.linalg.norm(given, axis=1)
     flat = given - np.sum(given * normals, axis=1, keepdims=True) * normals
     rest = np.linalg.norm(flat, axis=1)
-    bad = ~(np.isfinite(long) & (rest > FLAT * long))
+    # less is rounding of the normal, not a direction
+    bad = ~(np.isfinite(long) & (rest > 1e-3 * long))
     if np.any(bad):
         worst = int(np.flatnonzero(bad)[0])
         raise InvalidInputError(
@@ -423,19 +417,20 @@ def port_geodesics(
     body: Surface, ports: FloatArray, k: float, length: Length, *, sources: int | None = None
 ) -> PortRays:
     """All between ports (n, 3), L, up to a length, L; from the first so many, if not from all."""
-    pad = float(NEAR * np.cbrt(size(body) / k**2))
+    # so far from a caustic a port is close to it
+    pad = float(2 * np.cbrt(size(body) / k**2))
     return rays_between(body, ports, _fan_length(body, k, length), pad=pad, sources=sources)
 
 
 def _fan_length(body: Surface, k: float, length: Length) -> float:
-    """Length of geodesics, L: "auto" is by the decay of the first mode at the root mean square curvature."""
+    """Length of geodesics, L: "auto" is by the decay of the first mode at the root mean square curvature to e^-13."""
     if not (isinstance(length, str) and length == AUTO):
         return positive_number(length, "length")
     box = np.asarray(body.bounds, dtype=float)
     girth = np.pi * float(np.max(box[1] - box[0]))
     typical = float(np.median(curvature_norms(body, points_of_charts(body)))) / np.sqrt(2)
     decay = float(hard_modes().tau[0].imag) * np.cbrt(k / 2) * np.cbrt(typical) ** 2
-    return float(np.clip(DECAY / decay, GIRTHS[0] * girth, GIRTHS[1] * girth))
+    return float(np.clip(13 / decay, 0.65 * girth, 1.2 * girth))
 
 
 def _coupled(

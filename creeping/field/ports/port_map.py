@@ -19,8 +19,8 @@ from creeping._typing import ArrayLike, FloatArray
 from creeping.errors import InvalidInputError
 from creeping.field.boundary import BoundaryLike, boundary_name
 from creeping.field.ports.couplings import CLOSEST, checked_wave, port_geodesics
-from creeping.field.ports.path_waves import path_waves
 from creeping.field.ports.sums import port_sums
+from creeping.field.ports.tensor import path_waves
 from creeping.field.results.labelled import power
 from creeping.field.results.point_result import FieldStatus, PointField, point_dataset
 from creeping.geodesics.states import as_points, on_body

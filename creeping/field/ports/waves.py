@@ -35,21 +35,19 @@ from typing import NamedTuple
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray, IntArray
-from creeping.field.creeping_modes import fock_scale
-from creeping.field.special.airy import (
+from creeping.field.airy import (
     MODES,
     coupling_function,
     hard_modes,
     soft_coupling_function,
     soft_modes,
 )
+from creeping.field.boundary import fock_scale
 from creeping.field.waves.shed_wave import SECOND_ORDER, limited, smoothstep
 from creeping.rays.port_rays import PortRays
 
 LIMIT = 0.5
 """Bound of what second order adds at small ξ, and along the body, as a share of the wave: a series at its end."""
-DEEP, FEW = 2.5, 4
-"""ξ beyond which so few modes do, to 1e-6: e^{-ξ Im τ} of the fifth, τ = 7.37 e^{iπ/3}, over the first's."""
 
 
 class Path(NamedTuple):
@@ -106,7 +104,8 @@ def second_order(
     before, beyond = np.flatnonzero(weight < 1), np.flatnonzero(weight > 0)
     change = np.zeros_like(plain)
     change[before] = (1 - weight[before]) * early(before, plain[before])
-    for some, count in ((beyond[xi[beyond] <= DEEP], MODES), (beyond[xi[beyond] > DEEP], FEW)):
+    # beyond ξ = 2.5 four modes do, to 1e-6: e^{-ξ Im τ} of the fifth, τ = 7.37 e^{iπ/3}, over the first's
+    for some, count in ((beyond[xi[beyond] <= 2.5], MODES), (beyond[xi[beyond] > 2.5], 4)):
         change[some] += weight[some] * late(some, count)
     return change
 

@@ -1,6 +1,19 @@
-"""The wave on the body where its rays merge: beams along all rays of a fan, and which of rays and beams to take.
+"""Gaussian beams along geodesics of a body, from a line or from a point: their sum is finite on every caustic.
 
-    u(x) = sum of `creeping.field.waves.gaussian_beams` from the line, S = d.x0 + s, dsigma across the line
+    u(x) = sum over rays dsigma (k eps/2 pi)^(1/2) (k_c/k)^(1/2) q^(-1/2) y e^{ik S + (i/2) k_c (q'/q) n^2}
+    from a line    q = J1 + i eps J2          from a point    q = J2 - i eps J1
+    k_c = k - i y_s/y
+
+S is the phase along a ray, (s, n) the foot of x on it and the distance from there, and J1, J2 are the Jacobi fields
+J'' + K J = 0 with J1(0) = J2'(0) = 1, J1'(0) = J2(0) = 0. arg q is continuous along the ray, from 0 or -pi/2: it counts
+the caustics. By stationary phase each ray that passes through x contributes its own wave, y |J|^(-1/2). eps is free, a
+length from a point and its inverse from a line; what it changes is an error. A vector's beams have V + (k_c/k)
+(q'/q) n V' for components.
+
+Also here: the wave on the body where its rays merge: beams along all rays of a fan, and which of rays and beams to
+take.
+
+    u(x) = the sum from the line, S = d.x0 + s, dsigma across the line
 
 k_c, the wavenumber along the surface, is by a factor of 1 + tau/(2 m^2) more than k for a mode: without it the focus
 behind a sphere of ka = 30 is off by 6 %, with it by 0.6 %. Beams are cut off at the shadow line, so that they serve no
@@ -20,7 +33,7 @@ it is, for rays that merge, e_r as of `creeping.field.waves.ray_sums`; for beams
 with u_b' by beams of another width: eta is what a beam that varies across itself errs by. What u_r and u_b differ by
 beyond 2 e_b is added to e_r: on the dark side of a caustic rays know nothing of it.
 
-Sources: [P82], [CPP82]; Derivations, F22 and F24. A to C were set on the triaxial and the twisted ellipsoid.
+Sources: [P82], [CPP82]; Derivations, F22, F24 and F25. A to C were set on the triaxial and the twisted ellipsoid.
 """
 
 from collections.abc import Callable
@@ -35,7 +48,6 @@ from creeping.field.arguments import fock_parameter
 from creeping.field.boundary import Boundary
 from creeping.field.results.point_result import FieldStatus
 from creeping.field.waves.far_geometry import fan_strips
-from creeping.field.waves.gaussian_beams import WIDTH, GaussianBeams, beam_length, turned_by
 from creeping.field.waves.ray_sums import (
     FADED,
     LOST,
@@ -49,34 +61,114 @@ from creeping.field.waves.ray_sums import (
 from creeping.field.waves.shed_wave import smoothstep
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.pieces import trace_pieces
-from creeping.geodesics.states import P, X, pack
+from creeping.geodesics.states import M11, M12, M21, M22, P, X, pack
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.quadrature import BodyNodes, nodes_at
-from creeping.geometry.surface import normal, project
+from creeping.geometry.surface import Surface, normal, project, size
+from creeping.kernels.threads import in_threads
 from creeping.rays.fan import RayFan
 from creeping.rays.shedding import ShedRays
 from creeping.rays.strips import Strip
 
-SECONDS = 2e-8
-"""Of a beam's block of steps at one point."""
-DENSE, STEPS = 6.0, 8.0
-"""Beams a wavelength along the line, and steps a wavelength along them."""
-FEWEST = 64
-"""Beams of a strip, and steps, at least."""
-CUT, YOUNG = 4.0, (2.0, 3.0)
-"""Where beams are cut off that of a ray, and up to where rays stand by themselves, in widths w."""
-RTOL = 1e-9
-MAKING = 3e-6
-"""Seconds of making one step of a beam."""
-AT_ONCE = 200_000
-"""Steps of beams that are held at once: 60 MB."""
+WIDTH = 2.5
+"""Eps/a from a point, eps a from a line: free (F24); what another one changes is part of the error, and within it
+(``tests/field/test_port_beams.py``)."""
+MOST_TURNED = 0.5
+"""Bound of |k_c/k - 1|, which is tau/2m^2 of a mode (F24) and infinite where y is 0."""
 
+
+def beam_length(body: Surface) -> float:
+    """Length a, L: the radius of a ball of the body's size."""
+    return float(size(body) / np.sqrt(3))
+
+
+class GaussianBeams:
+    """Beams along rays (m,), known at the same steps (steps,).
+
+    Parameters
+    ----------
+    body : Surface
+    wavenumber : float, 1/L
+    states : (m, steps, 10)
+        Of the rays, with their Jacobi matrix.
+    sides : (m, steps, 3)
+        b = n x p.
+    curvature : (m, steps), 1/L
+        Normal curvature along b.
+    S : (m, steps), L
+        Phase over k.
+    logarithm, slope : (m, steps) complex, 1 and 1/L
+        log y without jumps, and y_s/y.
+    weight : (m,) or float
+        dsigma of each ray: L across a line, radians at a point.
+    known : (m, steps) complex, or 0
+        Added to log y, without a part in k_c.
+    """
+
+    def __init__(
+        self,
+        body: Surface,
+        wavenumber: float,
+        states: FloatArray,
+        sides: FloatArray,
+        curvature: FloatArray,
+        S: FloatArray,
+        logarithm: ComplexArray,
+        slope: ComplexArray,
+        weight: FloatArray | float,
+        known: ComplexArray | float = 0.0,
+    ) -> None:
+        from creeping.field.kernels.ray_profile import SPAN, spans_of
+
+        self.k, self.a, self.states = wavenumber, beam_length(body), states
+        turned = turned_by(slope, wavenumber)
+        self.turned = 1 + turned
+        strength = logarithm + known
+        self.size = strength.real + 0.5 * np.log(np.abs(self.turned)) + np.log(np.reshape(weight, (-1, 1)))
+        self.phase = strength.imag + 0.5 * np.angle(self.turned)
+        x, p, b, bent, S = (np.ascontiguousarray(of) for of in (states[..., X], states[..., P], sides, curvature, S))
+        self.rays = x, p, b, bent, S
+        rays, steps = S.shape
+        spans = -(-(steps - 1) // SPAN)
+        self.balls = np.empty((rays, spans, 3)), np.empty((rays, spans))
+        spans_of(x, *self.balls)
+        self.V, self.lean = np.ones((1, 1, 1), dtype=complex), np.zeros((1, 1, 1), dtype=complex)
+
+    def carry(self, V: ComplexArray, lean: ComplexArray) -> None:
+        """Take V and V' (m, steps, c) for components."""
+        self.V, self.lean = (np.ascontiguousarray(part, dtype=complex) for part in (V, lean))
+
+    def sums(self, points: FloatArray, eps: float, cut: int, *, from_point: bool = False) -> ComplexArray:
+        """Sums at points (n, 3), by feet before the step ``cut`` and behind it: (2, n, c)."""
+        from creeping.field.kernels.ray_profile import add_beams
+
+        one, other = (-1j * eps, 1.0) if from_point else (1.0, 1j * eps)
+        q = one * self.states[..., M11] + other * self.states[..., M12]
+        rate = one * self.states[..., M21] + other * self.states[..., M22]
+        amplitude = self.size - 0.5 * np.log(np.abs(q)) + 0.5 * np.log(self.k * eps / (2 * np.pi))
+        phase = self.phase - 0.5 * np.unwrap(np.angle(q), axis=1)
+        # a beam reaches as far as (ka)^(1/2) of its widths, so that nothing is lost from ka = 10 on
+        table = (*self.rays, amplitude, phase, rate / q * self.turned, self.k, cut, 0.9 * self.a, *self.balls)
+        out = np.zeros((2, len(points), self.V.shape[2]), dtype=complex)
+
+        def work(part: slice) -> None:
+            add_beams(points[part], *table, self.V, self.lean, out[0, part], out[1, part])
+
+        in_threads(work, len(points), least=64, multiple=1)
+        return out
+
+
+def turned_by(slope: ComplexArray, wavenumber: float) -> ComplexArray:
+    """Bounded k_c/k - 1 of waves with y_s/y = slope, 1/L."""
+    # where a wave vanishes its slope is infinite, and tells nothing
+    turned = np.nan_to_num(-1j / wavenumber * np.where(np.isfinite(slope), slope, 0.0))
+    return np.asarray(turned / np.maximum(1.0, np.abs(turned) / MOST_TURNED))
+
+
+CUT = 4.0
+"""Length of rays up to which they stand by themselves and beams count as early, in widths w."""
 LEAST, VARIES, BROADER = 0.02, 0.5, 1.5
 """A, B and C."""
-STRONG = 1.5
-"""Bound of |J|^(-1/2) in errors: on a caustic a ray is no stronger than its neighbours."""
-CROWD, FOCUSED = 8, 2.0
-"""Rays from which a point is a focus of all of them, and how much stronger than the field its waves are there."""
 FACTORS = (1.3, 0.8)
 """Widths of the beams that serve, and of those by which they are judged."""
 
@@ -120,17 +212,18 @@ def width(fan: RayFan, wavenumber: float) -> float:
 
 
 def _counts(strip: Strip, length: float, wavenumber: float) -> tuple[int, int]:
-    """Beams of a strip, and steps along them."""
+    """Beams of a strip, six a wavelength, and steps along them, eight."""
     low, high = strip.span
     per = wavenumber / (2 * np.pi)
-    return max(FEWEST, int(np.ceil(DENSE * (high - low) * per))), max(FEWEST, int(np.ceil(STEPS * length * per)))
+    return max(64, int(np.ceil(6 * (high - low) * per))), max(64, int(np.ceil(8 * length * per)))
 
 
 def seconds(fan: RayFan, strips: tuple[Strip, ...], wavenumber: float, count: int) -> float:
     """About how long beams take at so many points."""
     sizes = [_counts(strip, fan.length, wavenumber) for strip in strips]
-    summing = SECONDS * count * sum(beams * (1 + steps / 16) for beams, steps in sizes)
-    return 2 * (summing + MAKING * sum(beams * steps for beams, steps in sizes))
+    # 20 ns for a block of a beam's steps at one point, 3 us to make a step
+    summing = 2e-8 * count * sum(beams * (1 + steps / 16) for beams, steps in sizes)
+    return 2 * (summing + 3e-6 * sum(beams * steps for beams, steps in sizes))
 
 
 def beam_sums(
@@ -146,7 +239,8 @@ def beam_sums(
         (low, high), (count, steps) = strip.span, _counts(strip, fan.length, waves.wavenumber)
         sigma = low + (high - low) * (np.arange(count) + 0.5) / count
         times = np.linspace(0.0, fan.length, steps + 1)
-        some = max(1, AT_ONCE // len(times))
+        # 60 MB are held at once
+        some = max(1, 200_000 // len(times))
         cut = int(np.searchsorted(times, CUT * width(fan, waves.wavenumber)))
         for first in range(0, count, some):
             beams = _beams_of(fan, waves, number, sigma[first : first + some], (high - low) / count, times, components)
@@ -171,10 +265,10 @@ def _beams_of(
     launched = pack(project(body, first.points), first.directions, jacobi=True)
     ended = np.zeros((count, len(times)), dtype=bool)
     if is_piecewise(body):
-        trace = trace_pieces(body, launched, times, rtol=RTOL)
+        trace = trace_pieces(body, launched, times, rtol=1e-9)
         states, ended = trace.states, trace.end[:, None] <= times
     else:
-        states = trace_states(body, launched, times, rtol=RTOL)
+        states = trace_states(body, launched, times, rtol=1e-9)
     flat, p = states[..., X].reshape(-1, 3), states[..., P].reshape(-1, 3)
     nodes = nodes_at(body, flat, normal(body, flat))
     b = np.cross(nodes.normals, p)
@@ -253,8 +347,8 @@ def blended_sum(
     field = magnitude(values, sums)
     more = np.maximum(1.0, field / np.maximum(sums, 1e-300))
     # and at one where all rays of a fan come their number says how dense it is, and no more
-    crowd = total_of(np.ones(len(size)), shed.observer, len(values)) > CROWD
-    more = np.where(crowd, np.minimum(more, FOCUSED * field / np.maximum(sums, 1e-300)), more)
+    crowd = total_of(np.ones(len(size)), shed.observer, len(values)) > 8
+    more = np.where(crowd, np.minimum(more, 2 * field / np.maximum(sums, 1e-300)), more)
     error = np.hypot(more * total_of(size * bounded, shed.observer, len(values)), rest)
     return _judged(fan, shed, size, values, error, part >= 1, wavenumber, boundary)
 
@@ -333,5 +427,5 @@ def _apart_from_line(fan: RayFan, shed: ShedRays, k: float, count: int) -> tuple
     w = width(fan, k)
     near = shed.rays.time < CUT * w
     clear = np.ones(count)
-    np.minimum.at(clear, shed.observer[near], smoothstep(shed.rays.time[near] / w, *YOUNG))
+    np.minimum.at(clear, shed.observer[near], smoothstep(shed.rays.time[near] / w, 2, 3))
     return near, clear

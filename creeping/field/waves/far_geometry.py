@@ -49,27 +49,12 @@ from creeping.shadow.meshes import prepared
 from creeping.shadow.status import ATTACHED, NO_RAY
 from creeping.storage.memory import within_budget
 
-AT_ONCE = 20_000_000
-"""Samples of rays, times observers, that are searched before signals are heard: 0.1 s."""
-CELLS = (64, 2048)
-"""Room for cells of an observer at first, of smooth bodies and where rays part at tips; more is made where they are."""
-NUDGE = 1e-6
-"""Least angle between an observer and the forward direction in the forward integral, radians."""
-ALONG = 0.9
-"""p.r above which a crossing is near a ray towards the observer."""
 EARLY = 0.28
 """Time, in body sizes, before which a horizon crossing does not count for merging."""
 TAPERED = 0.2
 """p.r up to which a crossing is no node of the fan integral: its taper starts at 0.3."""
-LOBE_BYTES = 600.0
-"""Memory that a node of the forward integral takes."""
 APART = 2.0
 """Spacing of the nodes of a fan integral, in 1/k: a periodic integrand sampled so errs by less than 1e-6 of itself."""
-
-NEIGHBOURS = 12
-"""Parabolic points whose normals are nearest, and are asked."""
-LARGEST = 0.5357
-"""Largest value of Ai."""
 
 
 def fan_strips(fan: RayFan) -> tuple[Strip, ...]:
@@ -127,10 +112,10 @@ def launched_by(fan: RayFan) -> LaunchPoints:
 
 
 def off_axis(directions: FloatArray, axis: FloatArray) -> FloatArray:
-    """Unit directions (m, 3), those nearer to the axis than NUDGE turned away from it by that angle."""
-    near = np.linalg.norm(directions - axis, axis=1) < NUDGE
+    """Unit directions (m, 3), those nearer to the axis than 1e-6 turned away from it by that angle."""
+    near = np.linalg.norm(directions - axis, axis=1) < 1e-6
     aside = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-    turned = axis + NUDGE * aside / np.linalg.norm(aside)
+    turned = axis + 1e-6 * aside / np.linalg.norm(aside)
     return np.where(near[:, None], turned, directions)
 
 
@@ -214,13 +199,18 @@ class FarGeometry:
         back = np.ascontiguousarray((self.angle > np.pi / 2).reshape(n, many))
         # a ray crosses about once in every half turn; at worst each sample is a cell and a crossing
         most = len(times) * PARTS
-        cells, crossings = min(CELLS[is_piecewise(self.body)], most * rays), 2 + int(self.tracer.steps * TURN / np.pi)
+        # room at first, of which rays that part at tips take more; more is made where they need it
+        cells, crossings = (
+            min(2048 if is_piecewise(self.body) else 64, most * rays),
+            2 + int(self.tracer.steps * TURN / np.pi),
+        )
         arc = np.where(launch.curve_index == NO_RAY, np.nan, launch.arc_index)
         closed = np.ascontiguousarray(launch.closed)
         self.ends = RayEnds(self.tracer, launch, states, times)
         pieces = [(np.empty((0, 4), np.int64), np.empty((0, 2)), np.empty((0, 4)))]
-        # parts of a size that is the same wherever it runs: what is passed over depends on the observers of a call
-        share = max(1, AT_ONCE // max(1, rays * most))
+        # parts of a size that is the same wherever it runs: what is passed over depends on the observers of a call;
+        # signals are heard between them, after 0.1 s
+        share = max(1, 20_000_000 // max(1, rays * most))
         each, weights = max(1, share // max(1, many)), quintic_weights(times[1])
         for row, seen in np.ndindex(-(-n // each), -(-many // share)) if rays else ():
             here, some = slice(row * each, (row + 1) * each), slice(seen * share, (seen + 1) * share)
@@ -232,7 +222,7 @@ class FarGeometry:
                 with evaluators(self.body) as parts:
                     a, b = seek_all(
                         *parts[:2], times[1], weights, states[here], arc[here], closed[here],
-                        observers, behind, EARLY * size(self.body), ALONG, cells * chi.shape[1], crossings * rays,
+                        observers, behind, EARLY * size(self.body), 0.9, cells * chi.shape[1], crossings * rays,
                         found, places, crossed, chi, self._roots[here],
                     )  # fmt: skip
                 if a >= 0:
@@ -257,7 +247,7 @@ class FarGeometry:
 
     @property
     def least_merging(self) -> FloatArray:
-        """Least χ = |J|/(|J| + ρ|J'|) over crossings of the horizon with p.r > ALONG, of observers behind, else 0."""
+        """Least χ = |J|/(|J| + ρ|J'|) over crossings of the horizon with p.r > 0.9, of observers behind, else 0."""
         return self._chi.ravel()
 
     @cached_property
@@ -370,7 +360,7 @@ class FarGeometry:
                 reach = 2 ** (fineness / 4) * 2 * np.sin(self.angle[rows] / 2)
                 wanted_nodes = 48 + 1.5 * reach
                 within_budget(
-                    LOBE_BYTES * float(np.sum(wanted_nodes)),
+                    600.0 * float(np.sum(wanted_nodes)),
                     f"{np.sum(wanted_nodes):.2g} nodes of the forward integral",
                     "lower the wavenumber, or ask for fewer directions near d",
                 )
@@ -436,7 +426,7 @@ def fold_error(
         return out
     wanted, c = difference[rows] / length[rows, None], 0.5 * length[rows]
     tree = memo(body, "normals of parabolic points", lambda: cKDTree(found.normals))
-    near = tree.query(wanted, k=min(NEIGHBOURS, len(found.points)))[1].reshape(len(rows), -1)
+    near = tree.query(wanted, k=min(12, len(found.points)))[1].reshape(len(rows), -1)
     amplitude = _amplitude(found, near, wanted, c[:, None], wavenumber, size(body))
     # the wave must come to the ground, and leave it
     worth = np.nonzero(amplitude > 1e-6 * size(body))
@@ -455,7 +445,8 @@ def _amplitude(
     a = np.minimum(np.cbrt(1 / (k * c * np.maximum(found.bend[near], 1e-300))), extent)
     X = 2 * k * c * a * np.einsum("mnc,mnc->mn", wanted[:, None] - found.normals[near], found.axes[near])
     with np.errstate(divide="ignore"):
-        bright = np.minimum(LARGEST, 0.15 * np.maximum(X, 0.0) ** -1.75)
+        # as far as the largest value of Ai
+        bright = np.minimum(0.5357, 0.15 * np.maximum(X, 0.0) ** -1.75)
     wave = np.where(X < 0, airy(np.maximum(-X, 0.0))[0], bright)
     flattest = 1 / extent
     spread = np.sqrt(np.pi / (k * c * np.maximum(np.abs(found.across[near]), flattest)))

@@ -12,10 +12,18 @@ Its error adds in squares what is left out (`creeping.field.waves.likely_cells`,
 and what is beyond the second order of each ray, 3 |f2 - f1|^2/|f2|, of a specular point 3 T^2 |f|
 (`creeping.field.waves.reflected`), of the forward lobe 2 |f2 - f1| and 0.1 |F|/m̄^4.
 
-Sources: [LK59], [P79]; Derivations, F3, F10, F13 to F15. The thresholds of W and these factors were set by trial.
+Also here: the far field of many incidences as sums over sheets: rays and specular points that move with the incidence.
+
+    f_c = sum over sheets of a_c exp(i k_c L)
+
+A sheet is a ray shed towards an observer, or a specular point; its path L and its amplitudes a_c, one of each problem c
+(a boundary, its component and a wavenumber), are smooth functions of the incidence where the field itself oscillates.
+
+Sources: [LK59], [P79]; Derivations, F3, F10, F13 to F15 and F23. The thresholds of W and these factors were set by
+trial.
 """
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -34,29 +42,15 @@ from creeping.field.waves.reflected import (
     series_fails,
 )
 from creeping.field.waves.shed_wave import shed_orders, smoothstep
+from creeping.geometry.surface import size
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays
 from creeping.rays.specular import SpecularPoints
 
-FORWARD = (0.55, 0.85)
-"""m̄ θ between which the forward lobe gives way."""
-NEAR_AXIS = (0.3, 0.45)
-"""m̄ θ between which its silhouette gives way to the poles."""
-LONG_RAYS = (np.radians(4.0), np.radians(12.0))
 MATTERS = 0.05
 """Share of the field from which a contribution whose expansion fails makes a direction unresolved."""
-DARK = 0.5
-"""Share of the field that ground without rays may have before a direction is unresolved."""
-VAGUE, LOW = 0.5, 1.3
-"""Error over the sizes of all contributions from which a direction is unresolved where m̄ is less, k ρ of 4: there it is
-the expansion that fails, not one of its waves."""
-HIDDEN = 0.01
-"""Share of the shadow line from which hidden parts leave the forward lobe unresolved."""
-THIRD, UNSURE = 3.0, 1.5
-"""Third order over the square of the second, each beside the first; of an impedance, some terms of whose second order
-are left out, so many times that."""
-AHEAD = 0.1
-"""Error of the forward lobe over itself and 1/m̄⁴."""
+THIRD = 3.0
+"""Third order over the square of the second, each beside the first."""
 MERGED = (0.38, 0.52)
 """χ between which the fan integral replaces isolated rays."""
 
@@ -122,9 +116,10 @@ class Parts:
         theta = geometry.angle
         m_theta = geometry.mean_root_radius * np.cbrt(wavenumber / 2) * theta
         self.missing = np.zeros(len(theta), dtype=bool)
-        self.beyond_axis = smoothstep(m_theta, *NEAR_AXIS)
+        # where the silhouette has given way to the poles
+        self.beyond_axis = smoothstep(m_theta, 0.3, 0.45)
         self.in_fan = np.where(theta > np.pi / 2, smoothstep(geometry.least_merging, *MERGED), 0.0)
-        self.long_rays = self.in_forward * smoothstep(theta, *LONG_RAYS)
+        self.long_rays = self.in_forward * smoothstep(theta, np.radians(4.0), np.radians(12.0))
         self.left_out = (1 - self.in_forward) * np.hypot(self.ended, geometry.fold(wavenumber))
         # ground behind the rest of the line has no wave: its share of a field that is nowhere in particular
         self.dark = geometry.unserved * geometry.typical
@@ -133,12 +128,13 @@ class Parts:
         """What all parts have in common."""
         self.geometry, self.wavenumber, self.order = geometry, wavenumber, order
         self.incident, self.vector = geometry.direction, len(kinds) == 2
-        self.unsure = UNSURE if kinds[0].kind == "impedance" else 1.0
+        # some terms of an impedance's second order are left out
+        self.unsure = 1.5 if kinds[0].kind == "impedance" else 1.0
         m = len(geometry.directions)
         self.creeping, self.reflected, self.forward = (self._zeros() for _ in range(3))
         self.doubt, self.sizes, self.failing_size = self._zeros().real, np.zeros(m), np.zeros(m)
         m_theta = geometry.mean_root_radius * np.cbrt(wavenumber / 2) * geometry.angle
-        self.in_forward = 1 - smoothstep(m_theta, *FORWARD)
+        self.in_forward = 1 - smoothstep(m_theta, 0.55, 0.85)
         # of the worse polarisation
         ends = [geometry.ends.lost(geometry.directions, geometry.incidence, wavenumber, kind) for kind in kinds]
         self.ended: FloatArray = np.max(ends, axis=0)
@@ -176,10 +172,11 @@ class Parts:
         total = np.abs(self.creeping + self.reflected + self.forward)
         largest = total.max(axis=tuple(range(1, total.ndim)), initial=0.0)
         failing = np.maximum(self.failing_size, self.left_out)
-        without = ~(self.dark <= DARK * largest)
+        without = ~(self.dark <= 0.5 * largest)
         # contributions may cancel: a deep null is none the worse for it; of a conductor two come for every wave
-        vague = ~(_sizes(self.error()) <= VAGUE * self.sizes / np.sqrt(2 if self.vector else 1))
-        without |= vague & (self.geometry.mean_root_radius * np.cbrt(self.wavenumber / 2) < LOW)
+        vague = ~(_sizes(self.error()) <= 0.5 * self.sizes / np.sqrt(2 if self.vector else 1))
+        # up to k ρ of 4 it is the expansion that fails, not one of its waves
+        without |= vague & (self.geometry.mean_root_radius * np.cbrt(self.wavenumber / 2) < 1.3)
         return np.asarray((self.missing & (self.in_forward > 0)) | ~(failing <= MATTERS * largest) | without)
 
     def error(self) -> FloatArray:
@@ -188,7 +185,7 @@ class Parts:
         g, more = self.geometry, (1,) * (self.creeping.ndim - 1)
         # where most of the forward lobe is one sum over the rim, its error falls like that of Fock's currents
         scale = (g.mean_root_radius * np.cbrt(self.wavenumber / 2)).reshape(-1, *more)
-        ahead = self.unsure * AHEAD * np.abs(self.forward) / scale**4
+        ahead = self.unsure * 0.1 * np.abs(self.forward) / scale**4
         error = np.hypot(error.reshape(-1, *more), np.hypot(np.sqrt(self.doubt), ahead))
         return np.asarray(np.where(np.isfinite(error), error, np.nan))
 
@@ -286,7 +283,7 @@ class Parts:
         self._add_whole(self.forward, *sums, sharp=False)
         for incidence in np.unique(g.incidence[w > 0]):
             here, line = (g.incidence == incidence) & (w > 0), g.line_of(int(incidence))
-            self.missing[here] |= line.fractions["occluded"] > HIDDEN
+            self.missing[here] |= line.fractions["occluded"] > 0.01
             ahead = np.flatnonzero(here & (self.beyond_axis < 1))
             wave = (w * (1 - self.beyond_axis))[ahead] * silhouette(line, g.directions[ahead], k)
             # any normal of the plane of d and r will do, and any vector across d where they are one
@@ -375,3 +372,77 @@ def _methods(forward: FloatArray, fan: FloatArray) -> np.ndarray[Any, np.dtype[n
         ]
         names.append("+".join(used))
     return np.array(names, dtype="<U16")
+
+
+class Sheets(NamedTuple):
+    """Sheets of incidences with their observers.
+
+    Attributes
+    ----------
+    observer : (n,) of int
+        Row of the observer, ascending; those of one incidence follow each other.
+    creeping : (n,) of bool
+        Whether it is a shed ray, else a specular point.
+    key : (n, 4)
+        Where the ray leaves, and its time, in body sizes: what tells neighbours.
+    path : (n,), L
+        L.
+    amplitudes : (n, problems), L
+        Complex.
+    """
+
+    observer: IntArray
+    creeping: BoolArray
+    key: FloatArray
+    path: FloatArray
+    amplitudes: ComplexArray
+
+
+def sheets_of(geometry: FarGeometry, parts: list[Parts]) -> Sheets:
+    """Sheets of a geometry with the amplitudes of all its problems, one component after the other of each."""
+    shed, specular = geometry.shed, geometry.specular
+    rays, length = shed.rays, size(geometry.body)
+    points = specular.points
+    path = np.concatenate([rays.departing, specular.path(geometry.direction[specular.observer], geometry.directions)])
+    key = np.concatenate(
+        [
+            np.concatenate([rays.points, rays.time[:, None]], axis=1),
+            np.concatenate([points, np.zeros((len(points), 1))], axis=1),
+        ]
+    )
+    waves = np.concatenate(
+        [
+            np.concatenate([_columns(one.shed_waves, len(shed.observer)) for one in parts], axis=1),
+            np.concatenate([_columns(one.specular_waves, len(points)) for one in parts], axis=1),
+        ]
+    )
+    numbers = np.concatenate([np.full(_width(one), one.wavenumber) for one in parts])
+    with np.errstate(invalid="ignore"):
+        amplitudes = waves * np.exp(-1j * numbers * path[:, None])
+    observer = np.concatenate([shed.observer, specular.observer])
+    creeping = np.arange(len(observer)) < len(shed.observer)
+    # what has come to its end, or is hidden, is not there
+    there = np.flatnonzero(np.any(amplitudes != 0, axis=1))
+    order = there[np.argsort(observer[there], kind="stable")]
+    return Sheets(observer[order], creeping[order], key[order] / length, path[order], amplitudes[order])
+
+
+def isolated(geometry: FarGeometry, parts: list[Parts]) -> BoolArray:
+    """Whether the field of each observer is that of its sheets, whatever the problem: no integral serves (m,)."""
+    alone = np.ones(len(geometry.directions), dtype=bool)
+    for one in parts:
+        alone &= (one.in_forward == 0) & (one.in_fan == 0)
+    return alone
+
+
+def _width(parts: Parts) -> int:
+    return 4 if parts.vector else 1
+
+
+def _columns(waves: list[ComplexArray], count: int) -> ComplexArray:
+    """Contributions of both polarisations of a conductor, or of the one scalar problem, as columns (count, ...)."""
+    return np.asarray(np.sum(waves, axis=0, dtype=complex).reshape(count, -1) if count else np.zeros((0, _size(waves))))
+
+
+def _size(waves: list[ComplexArray]) -> int:
+    return int(np.prod(waves[0].shape[1:], dtype=int))

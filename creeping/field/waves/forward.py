@@ -6,7 +6,7 @@
     beyond      g = p* - c²/(2√π ξ),  c = n0.e on S (e along r across d), c = n.(r - d)/|r - d| on L
 
 By stationary phase I_S is the isolated ray and I_L the reflected field. The fan integral is I_S with g = e^{-iπ/4} P
-over every crossing, tapered in p.r; it replaces isolated rays where they merge.
+over every crossing, tapered between p.r of 0.3 and 0.7; it replaces isolated rays where they merge.
 
 Also here: the step of a cut that fits the lobes of its pattern: lambda/D wide if bistatic, half of that in backscatter.
 
@@ -17,23 +17,14 @@ import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
 from creeping.field.arguments import checked, fock_parameter, scales
-from creeping.field.boundary import Boundary
-from creeping.field.creeping_modes import fock_scale
-from creeping.field.special.fock import pekeris_slope, pekeris_star
+from creeping.field.boundary import Boundary, fock_scale
+from creeping.field.fock import pekeris_slope, pekeris_star
 from creeping.field.waves.shed_wave import SECOND_ORDER, shared_pole, shed_orders, shed_wave, smoothstep
 from creeping.geometry.surface import Surface
 from creeping.rays.observer_contour import HorizonRays, MidHorizon
 from creeping.shadow.attachment import line_tangents
 from creeping.shadow.line import ShadowLine
 from creeping.storage.memory import within_budget
-
-TAPER = (0.3, 0.7)
-"""p.r between which a crossing comes to count."""
-
-PER_LOBE = 4
-"""Angles for each lobe of a pattern."""
-NICE = (1.0, 0.5, 0.25, 0.2, 0.1, 0.05, 0.025, 0.02, 0.01, 0.005, 0.002, 0.001)
-"""Steps of a cut, degrees, the largest that fits is taken."""
 
 
 def shadow_half(
@@ -80,7 +71,7 @@ def _crossing_factor(nodes: HorizonRays, r: FloatArray, wavenumber: float) -> Co
     rays = nodes.rays
     m1, m2 = scales(rays, wavenumber)
     phase = wavenumber * (rays.eikonal - np.sum(r * rays.points, axis=1)) - 0.5 * np.pi * rays.caustics
-    taper = smoothstep(np.sum(rays.directions * r, axis=1), *TAPER) * rays.alive
+    taper = smoothstep(np.sum(rays.directions * r, axis=1), 0.3, 0.7) * rays.alive
     amplitude = np.sqrt(np.abs(rays.spreading) * np.where(np.isfinite(m1 * m2), m1 * m2, 0.0)) * taper
     with np.errstate(invalid="ignore"):
         factor = -amplitude / np.sqrt(np.pi) * nodes.weight * np.exp(1j * phase)
@@ -168,7 +159,7 @@ def silhouette(line: ShadowLine, observers: FloatArray, wavenumber: float) -> Co
 
 
 def lobe_step(body: Surface, wavenumber: float, *, monostatic: bool) -> float:
-    """Step of a cut, degrees, with PER_LOBE angles for each lobe: lambda/D of a bistatic pattern, half in backscatter.
+    """Step of a cut, degrees, with four angles for each lobe: lambda/D of a bistatic pattern, half in backscatter.
 
     Examples
     --------
@@ -178,5 +169,5 @@ def lobe_step(body: Surface, wavenumber: float, *, monostatic: bool) -> float:
     """
     longest = float(np.max(np.ptp(body.bounds, axis=0)))
     lobe = 2 * np.pi / (float(checked(wavenumber, 2)) * longest) / (2 if monostatic else 1)
-    wanted = np.degrees(lobe) / PER_LOBE
-    return next((step for step in NICE if step <= wanted), NICE[-1])
+    steps = (1.0, 0.5, 0.25, 0.2, 0.1, 0.05, 0.025, 0.02, 0.01, 0.005, 0.002, 0.001)
+    return next((step for step in steps if step <= np.degrees(lobe) / 4), steps[-1])

@@ -3,15 +3,18 @@
 A cell lies between two rays and two times; the search on the fan has it where n.r and b.r have both signs at its
 corners. Where rays part at a tip such cells are many; most have no place where both heights vanish, or p = -r there.
 With both heights bilinear in the cell, the place is one step of Newton's method from the nearest one in the cell; it is
-likely up to MARGIN cells outside, where p.r, held in the cell, is above AHEAD. Between rays that have parted, one on
+likely up to a cell outside, where p.r, held in the cell, is above 0.8: rays leave towards r there and not past it.
+Between rays that have parted, one on
 either side of a tip, nothing is bilinear: neighbours are parted where they are
 
-    |x_2 - x_1| > max(GAP size, SPREAD |J| spacing)
+    |x_2 - x_1| > max(0.2 size, 3 |J| spacing)
 
 apart, and what would come to such a cell counts as lost, as does what would come between a ray that has ended at a tip
-and a neighbour that goes on. Elsewhere r is no farther from the nearest p of the corners than REACH times what they are
-from each other. Where the place tells nothing, next to a tip and where both heights are as good as parallel, a cell is
-likely if r is nearer than FARTHEST to a corner's p, and where r is nearer than BESIDE in any case.
+and a neighbour that goes on. Fans are refined to gaps of 0.1, and J tells how far rays of coarser ones part. Elsewhere
+r is no farther from the nearest p of the corners than 0.6 times what they are from each other: 1/√3 at most within a
+triangle. Where the place tells nothing, within 0.03 sizes of a tip, where rays turn faster than samples tell, and where
+both heights are as good as parallel, beyond 8 cells, a cell is likely if r is nearer than 0.4 to a corner's p, and
+where r is nearer than 0.1 in any case: next to a tip bilinear functions bend.
 
 Also here: what rays would still give that end too early: they are traced on, and their waves counted where they would
 leave.
@@ -31,8 +34,7 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.field.arguments import scales
-from creeping.field.boundary import Boundary
-from creeping.field.creeping_modes import fock_scale, modes_of
+from creeping.field.boundary import Boundary, fock_scale, modes_of
 from creeping.field.waves.shed_wave import shed_wave
 from creeping.geodesics.attenuation import curvature_values
 from creeping.geodesics.states import M11, P, X
@@ -45,32 +47,8 @@ from creeping.shadow.attachment import LaunchPoints, evenly_chosen, line_tangent
 if TYPE_CHECKING:
     from creeping.rays.tracer import RayTracer
 
-MARGIN = 1.0
-"""How far outside a cell a place may be: its rays are parted by that much or the search gives them up soon."""
-GAP, SPREAD = 0.2, 3.0
-"""Fans are refined to gaps of 0.1; J tells how far rays of coarser ones part where no tip parts them."""
-AHEAD = 0.8
-"""p.r of a place, of unit vectors between the corners, above which rays leave towards r and not past it."""
-REACH, FARTHEST = 0.6, 0.4
-"""Distance of r from the nearest p of a cell, in the largest one of two of them: 1/√3 at most within a triangle. And
-the one from which on a search would lead nowhere."""
-BESIDE, WILD = 0.1, 8.0
-"""Distance of r from the nearest p below which a cell is tried wherever its bilinear functions vanish: next to a tip
-they bend. And the distance of that place, in cells, beyond which it tells nothing: they are parallel."""
-TIP = 0.03
-"""Distance from a tip, in body sizes, within which places tell nothing either, however dense the fan: rays turn there
-faster than samples of them tell."""
-
-SOME = 32
-"""Rays of an incidence that stand for all."""
 SAMPLES = 64
-"""Points of each beyond its end, over LONGEST body sizes."""
-NEAR = float(np.cos(0.3))
-"""p.r from which a point is one that leaves towards r: rays and points are some 0.2 apart."""
-SEVERAL = 2.0
-"""Rays that one direction may have lost."""
-SLOW = 0.1
-"""Least Im tau that is reckoned with."""
+"""Points of each ray beyond its end, over LONGEST body sizes."""
 
 
 def likely_found(
@@ -152,10 +130,10 @@ def likely_cells(
         apart = np.linalg.norm(corners_of - observers[:, None], axis=2).min(axis=1)
         wide = np.linalg.norm(corners_of[:, :, None] - corners_of[:, None], axis=3).max(axis=(1, 2))
         off = np.maximum(np.abs(u1 - 0.5), np.abs(v1 - 0.5))
-        bent = (off > WILD) | (_from_tips(body, x).reshape(n, 4).min(axis=1) < TIP * size(body))
-        near = (off <= 0.5 + MARGIN) | bent | (apart <= BESIDE)
-        reach = np.where(bent, FARTHEST, np.minimum(REACH * wide, FARTHEST))
-        towards = _bilinear(ahead, np.clip(u1, 0, 1), np.clip(v1, 0, 1))[0] > AHEAD
+        bent = (off > 8) | (_from_tips(body, x).reshape(n, 4).min(axis=1) < 0.03 * size(body))
+        near = (off <= 1.5) | bent | (apart <= 0.1)
+        reach = np.where(bent, 0.4, np.minimum(0.6 * wide, 0.4))
+        towards = _bilinear(ahead, np.clip(u1, 0, 1), np.clip(v1, 0, 1))[0] > 0.8
         corners, J = x.reshape(n, 2, 2, 3), states[rays, np.minimum(sample // parts, states.shape[1] - 1)[:, None], M11]
         one = parted(body, corners[:, 0], corners[:, 1], np.max(np.abs(J), axis=1)[:, None], spacing[:, None])
         # where nothing can be told, a cell is likely
@@ -173,7 +151,7 @@ def _from_tips(body: Any, x: FloatArray) -> FloatArray:
 def parted(body: Any, x: FloatArray, other: FloatArray, spreading: FloatArray, spacing: FloatArray) -> BoolArray:
     """Whether neighbours at points (..., 3), L, with J and spacing (...), go on either side of a tip."""
     gap = np.linalg.norm(x - other, axis=-1)
-    return np.asarray(gap > np.maximum(GAP * size(body), SPREAD * np.abs(spreading) * spacing))
+    return np.asarray(gap > np.maximum(0.2 * size(body), 3 * np.abs(spreading) * spacing))
 
 
 def _between(
@@ -219,7 +197,7 @@ class RayEnds:
 
     def __init__(self, tracer: "RayTracer", launch: LaunchPoints, states: FloatArray, times: FloatArray) -> None:
         self.body, self._tracer = tracer.body, tracer
-        self._incidence, ray = np.nonzero(evenly_chosen(launch.there, SOME))
+        self._incidence, ray = np.nonzero(evenly_chosen(launch.there, 32))
         self._starts = launch.points[self._incidence, ray]
         self._directions = launch.directions[self._incidence]
         self._attenuation = _attenuation(self.body, states[self._incidence, ray], times)
@@ -233,12 +211,12 @@ class RayEnds:
         # of an impedance at the mean curvature, for the question is only which rays to trace on
         mean = self._attenuation**1.5 / self._tracer.length**1.5
         m = fock_scale(wavenumber, np.where(np.isfinite(mean), mean, 1.0))
-        slowest = np.maximum(np.min(np.atleast_2d(modes_of(boundary, m).tau.imag), axis=-1), SLOW)
+        slowest = np.maximum(np.min(np.atleast_2d(modes_of(boundary, m).tau.imag), axis=-1), 0.1)
         late = np.cbrt(wavenumber / 2) * self._attenuation * slowest < DECAY
         if not np.any(late):
             return out
         incidences, points = self._traced_on(late)
-        size_of = SEVERAL * _amplitude(points, wavenumber, boundary)
+        size_of = 2 * _amplitude(points, wavenumber, boundary)
         for number in np.unique(incidences):
             rows, mine = np.flatnonzero(incidence == number), incidences == number
             amplitude, p = size_of[mine].ravel(), points.directions[mine].reshape(-1, 3)
@@ -246,7 +224,8 @@ class RayEnds:
             # 64 observers at a time, for the memory's sake
             for first in range(0, len(rows), 64):
                 some = rows[first : first + 64]
-                near = directions[some] @ p[there].T > NEAR
+                # rays and points are some 0.2 apart
+                near = directions[some] @ p[there].T > np.cos(0.3)
                 out[some] = np.max(np.where(near, amplitude[there], 0.0), axis=1, initial=0.0)
         return out
 

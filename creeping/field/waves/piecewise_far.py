@@ -7,18 +7,18 @@ with w of the forward lobe as in `creeping.field.waves.far_rays`. A smooth part 
 (`creeping.field.waves.piecewise_far`) holds facets, specular points next to edges, and the forward lobe. The error adds
 in squares, besides what is beyond the second order of each ray and specular point,
 
-    edges      C/(2π) |∫ e^{ik(d - r).x} dl|        lit or part of the outline, and their parts, C of order 1
+    edges      1/(2π) |∫ e^{ik(d - r).x} dl|        lit or part of the outline, and their parts
     line       1/(2π) |∫ min[κ/(k (1 - d.r)²), (kρ)^(1/3)] e^{ik(d - r).x} dl|, of a conductor |d x r|/(1 - d.r) more
     ends       1/(2π) |Σ 2 e^(-ξ Im τ) |J|^(1/2) h e^{ik(d.x0 + s - r.x)}|       rays that end at edges and tips
     tips       1/(4k) each lit one
     joints     3/2 |f_optics - f_specular| of parts with joints, where specular points serve; a conductor's as if soft
     optics     its next order, κ/(k cos³θᵢ) of each tile
 
-An incremental length of edge radiates about C/(2π) beside what physical optics has of it; the current of physical
-optics starts with a kink at the line, whose end-point contribution is the first under ``line``; the second is the wave
-of the penumbra, ahead. That of a conductor starts with a jump, of a current along d, which sends nothing along d.
-Between the faces of a concave edge the wave is reflected more than once: that is left out, and so is everything shed by
-an edge and scattered again.
+An incremental length of edge radiates about 1/(2π) beside what physical optics has of it, but next to shadow
+boundaries; the current of physical optics starts with a kink at the line, whose end-point contribution is the first
+under ``line``; the second is the wave of the penumbra, ahead. That of a conductor starts with a jump, of a current
+along d, which sends nothing along d. Between the faces of a concave edge the wave is reflected more than once: that is
+left out, and so is everything shed by an edge and scattered again.
 
 Also here: physical optics of the lit tiles of a body: what its facets and curved pieces reflect, and the shadow they
 cast.
@@ -45,8 +45,7 @@ from typing import NamedTuple
 import numpy as np
 
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
-from creeping.field.boundary import SOFT, Boundary, BoundaryLike, scalar_boundaries
-from creeping.field.creeping_modes import fock_scale, modes_of
+from creeping.field.boundary import SOFT, Boundary, BoundaryLike, fock_scale, modes_of, scalar_boundaries
 from creeping.field.results.far_result import FarField, spherical_frame
 from creeping.field.waves.far_geometry import FarGeometry, far_geometry
 from creeping.field.waves.far_rays import Parts
@@ -63,33 +62,14 @@ from creeping.shadow.attachment import occluded
 from creeping.shadow.piecewise import convex, unit_normals
 from creeping.storage.memory import within_budget
 
-WEDGE = 1.0
-"""C: what a wedge scatters beside physical optics, times 2π, is of this size but next to its shadow boundaries."""
-JOINTS = 1.5
-"""What joints scatter beside specular points, over what physical optics has of it."""
-STRAIGHT = 1e-6
-"""Curvature, in inverse body sizes, up to which a ray that seems to detach goes straight, as along a generator."""
-PARTS_OF_EDGE = 16
-"""Parts of an edge whose waves are added in squares too: stationary points of its phase stand apart."""
 MATTERS = 0.25
 """Share of the field from which what is left out makes a direction unresolved."""
-STEEP = 1e-9
-"""1 - d.r below which the end-point contribution has no bound of its own."""
 OUTWARD = 1e-4
-"""Distance from an edge, in body sizes, at which it is asked whether the wave comes to it."""
-
+"""Distance from an edge or tip, in body sizes, at which it is asked whether the wave comes to it."""
 SAG = 0.1
 """k h² κ of a tile: its phase then errs by a hundredth of a radian on average, in backscatter."""
-LONGEST, SHORTEST = 0.1, 2e-3
-"""Longest and shortest sides of tiles, in body sizes."""
-SLIVERS = 16.0
-"""Tiles, in units of what squares of their side would be, from which on they are taken for slivers."""
-USUAL = 0.95
-"""Share of the area whose curvature the sides go by: next to a tip it is without bound."""
-OPTICS_OUTWARD = 1e-6
-"""Distance from the body, in its sizes, at which a tile is asked whether the wave comes to it."""
 FLAT = 1e-6
-"""Curvature, in inverse sizes, below which a tile is flat."""
+"""Curvature, in inverse sizes, below which a tile is flat, and a ray that seems to detach goes along a generator."""
 
 
 def piecewise_far_field(fan: RayFan, r: FloatArray, k: float, boundary: BoundaryLike, order: int) -> FarField:
@@ -136,11 +116,10 @@ class PiecewiseParts(Parts):
                 self.specular.append((points, (1 - share)[points.observer]))
             optics = optics_field(tiles.on(part), r, wavenumber, kinds, self.in_forward)
             if len(part) > 1 and points is not None:
-                kind = kinds[0] if len(kinds) == 1 else SOFT
-                scalar = (
-                    optics if len(kinds) == 1 else optics_field(tiles.on(part), r, wavenumber, (SOFT,), self.in_forward)
-                )
-                lost.append(JOINTS * (1 - share) * np.abs(scalar.values - self._leading(points, kind)))
+                kind, scalar = kinds[0], optics
+                if self.vector:
+                    kind, scalar = SOFT, optics_field(tiles.on(part), r, wavenumber, (SOFT,), self.in_forward)
+                lost.append(1.5 * (1 - share) * np.abs(scalar.values - self._leading(points, kind)))
             self.reflected += share.reshape(-1, *(1,) * (self.creeping.ndim - 1)) * optics.values
             lost += [share * optics.next_order, share * _line(fan, part, r, wavenumber, self.vector)]
         self.left_out = np.sqrt(np.sum(np.square(lost), axis=0))
@@ -206,12 +185,13 @@ def _edges(fan: RayFan, observers: FloatArray, k: float) -> tuple[FloatArray, fl
         middles, shining = 0.5 * (x[1:] + x[:-1]), (lit[1:] | lit[:-1])
         waves = np.exp(1j * k * (middles @ (d - observers).T)) * (chords * shining)[:, None]
         whole += waves.sum(axis=0)
-        cuts = np.unique(np.linspace(0, len(waves), PARTS_OF_EDGE + 1).astype(int))[:-1]
+        # stationary points of the phase stand apart: sixteen parts of an edge are added in squares too
+        cuts = np.unique(np.linspace(0, len(waves), 17).astype(int))[:-1]
         parts += np.sum(np.abs(np.add.reduceat(waves, cuts, axis=0)) ** 2, axis=0)
         concave = ~(convex(body, x, *n)[1:]) & shining & (np.maximum(n[0] @ d, n[1] @ d) < 0)[1:]
         facing += float(np.sum(chords[concave]))
     outline = fan.line.length + sum(part.length for part in fan.line.on_edges)
-    return WEDGE / (2 * np.pi) * np.hypot(np.abs(whole), np.sqrt(parts)), min(facing / outline if outline else 0.0, 1.0)
+    return np.hypot(np.abs(whole), np.sqrt(parts)) / (2 * np.pi), min(facing / outline if outline else 0.0, 1.0)
 
 
 def _refined(x: FloatArray, k: float) -> FloatArray:
@@ -226,7 +206,7 @@ def _refined(x: FloatArray, k: float) -> FloatArray:
 def _line(fan: RayFan, part: tuple[int, ...], observers: FloatArray, k: float, jumps: bool) -> FloatArray:
     """What physical optics has wrong next to the line on a smooth part of the body (m,), L."""
     d, out = fan.line.direction, np.zeros(len(observers), dtype=complex)
-    steep = np.maximum(1 - observers @ d, STEEP)
+    steep = np.maximum(1 - observers @ d, 1e-9)
     jump = np.linalg.norm(np.cross(observers, d), axis=1) / steep if jumps else 0.0
     for curve in fan.line.curves:
         for start, end, status in curve.arcs:
@@ -265,7 +245,7 @@ def _goes_straight(fan: RayFan) -> BoolArray:
     """Rays (rays,) that detach by rounding alone, where they come to a straight surface beyond a joint."""
     after = np.minimum(np.searchsorted(fan.travel_time, fan.detachment), len(fan.travel_time) - 1)
     bent = np.take_along_axis(fan.curvature, after[:, None], axis=1)[:, 0]
-    return np.asarray((fan.status == RayStatus.DETACHED) & (bent > -STRAIGHT / size(fan.body)))
+    return np.asarray((fan.status == RayStatus.DETACHED) & (bent > -FLAT / size(fan.body)))
 
 
 def _between(fan: RayFan, k: float, kind: Boundary) -> float:
@@ -332,13 +312,15 @@ class LitTiles(NamedTuple):
 
 def side_of_tiles(body: Any, wavenumber: float) -> float:
     """Share of the body's size that tiles may have as sides; one of few, so that frequencies share them."""
-    coarse = tiles_of(body, LONGEST)
+    shortest, longest = 2e-3, 0.1
+    coarse = tiles_of(body, longest)
     bound = _curvatures(body, coarse, coarse.corners.mean(axis=1))
     order = np.argsort(bound)
     covered = np.cumsum(coarse.areas[order])
-    usual = float(bound[order][min(np.searchsorted(covered, USUAL * covered[-1]), len(order) - 1)])
+    # next to a tip curvature is without bound: that of 95 % of the area counts
+    usual = float(bound[order][min(np.searchsorted(covered, 0.95 * covered[-1]), len(order) - 1)])
     side = np.sqrt(SAG / (wavenumber * max(usual, 1e-3 / size(body)))) / size(body)
-    return float(np.clip(2 ** (np.floor(2 * np.log2(side)) / 2), SHORTEST, LONGEST))
+    return float(np.clip(2 ** (np.floor(2 * np.log2(side)) / 2), shortest, longest))
 
 
 def _curvatures(body: Any, tiles: Tiles, middles: FloatArray) -> FloatArray:
@@ -359,7 +341,7 @@ def lit_tiles(body: Any, direction: FloatArray, share: float) -> LitTiles:
     middles = tiles.corners[lit].mean(axis=1)
     if not is_convex(body):
         asked, of = _representatives(tiles, lit, middles, share * size(body))
-        above = middles[asked] + (OPTICS_OUTWARD + share**2) * size(body) * n[lit][asked]
+        above = middles[asked] + (1e-6 + share**2) * size(body) * n[lit][asked]
         free = ~occluded(body, above, direction)[of]
         lit, middles = lit[free], middles[free]
     some = Tiles(tiles.corners[lit], tiles.normals[lit], tiles.pieces[lit])
@@ -373,7 +355,7 @@ def _representatives(tiles: Tiles, lit: IntArray, middles: FloatArray, side: flo
     Each for itself, unless slivers of a long mesh make many more tiles than their sides would: then one a cube.
     """
     each = np.arange(len(lit))
-    if len(tiles.areas) < SLIVERS * float(tiles.areas.sum()) / side**2:
+    if len(tiles.areas) < 16 * float(tiles.areas.sum()) / side**2:
         return each, each
     cell = np.column_stack([tiles.pieces[lit], np.floor(middles / side).astype(np.int64)])
     _, first, of = np.unique(cell, axis=0, return_index=True, return_inverse=True)

@@ -4,9 +4,9 @@ With T = J + l J' the width of a ray's tube, T' its slope across the rays, and J
 
     error^2 = (sum |ui| e_i)^2 + sum_i |ui|^2 f_i + (sum_pairs P (|ui| + |uj|)/(k |Li - Lj|))^2 + (sum |ui| g_i)^2
     f = (5/8k) T'^2/T^4/(3 |J'/T| + 1/(s + l)),   g = e^(-a (xi_end - xi))
-    e = [(A/m^2)^2 + (B V)^2 + (E S/m^2)^2]^(1/2) off the body
+    e = [(0.3/m^2)^2 + (B V)^2 + (E S/m^2)^2]^(1/2) off the body
     e = [(C |u2/u1 - 1|^2)^2 + xi^2 (B V)^2 + xi^2 (D r^2)^2]^(1/2) on it
-    V = (|rho rho''| + rho'^2)/m^2,   r = rho kappa_t/m^2;   A/m^2, V and r means of both ends;
+    V = (|rho rho''| + rho'^2)/m^2,   r = rho kappa_t/m^2;   1/m^2, V and r means of both ends;
     S the share in which the wave is of leading order, close above the ground behind the shadow line;
     of a conductor r/m^2 for r^2, and of either polarisation 0.8 of what grows with xi of the other one's |u| more
 
@@ -18,12 +18,12 @@ than one found by the decay a of the first mode, g.
 Also here: what the polarisations of a conductor's creeping rays do to each other.
 
     c = i κ_t1 κ_t2/(k J')                                 of the other's wave comes with each, exact on the sphere
-    ξ √((VARIES B)² + (LEANS (r - 1))²)/m²                 may pass on the way: an error, 0 on the sphere
+    ξ √((0.3 B)² + (0.5 (r - 1))²)/m²                      may pass on the way: an error, 0 on the sphere
 
 with B = |ρρ''| + ρ'² and r = ρ κ_t, means of both ends.
 
-Sources: [LK59], [AS64, sec. 9.2 and 10.4]; Derivations, F20. A to D were set on four bodies
-(`studies.accuracy.point_coverage`); Derivations, F14.
+Sources: [LK59], [AS64, sec. 9.2 and 10.4]; Derivations, F20. 0.3 and B to D were set on four
+bodies (`studies.accuracy.point_coverage`), the turning on three ellipsoids; Derivations, F14.
 """
 
 from dataclasses import dataclass
@@ -33,20 +33,16 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.arguments import fock_parameter, scales, transverse_ratios
-from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT, Boundary
-from creeping.field.creeping_modes import fock_scale, slowest_decay
+from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT, Boundary, fock_scale, slowest_decay
 from creeping.field.results.point_result import FieldStatus
 from creeping.field.waves.far_geometry import fan_strips
-from creeping.field.waves.near_wave import first_order_share
 from creeping.field.waves.shed_wave import left_out
+from creeping.field.waves.surface import first_order_share
 from creeping.rays.ends import RayStatus
 from creeping.rays.fan import RayFan
 from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays
 from creeping.rays.strips import Strip
-
-CLOSE = 0.3
-"""A."""
 
 
 class RayFactors(NamedTuple):
@@ -80,29 +76,17 @@ FACTORS = {
 }
 LEAST_XI = 0.7
 """The least xi that the error on the body grows with, and what a conductor's polarisations turn by."""
-MIXED = 0.8
-"""What torsion brings from one polarisation to the other on the way, as a share of what grows with xi."""
 MERGING = 0.3
 """P: 5/36 at a fold, 1/4 on the axis of a sphere."""
-FOLDED, MERGED = 0.008, 0.04
-"""Shares of the waves from which f and merging make a point one of a caustic."""
 NARROW = 0.25
 """m |T|/(|J| + l |J'|) below which a ray is on a caustic, whatever else there is."""
-NARROW_ALONE = 1.0
-"""The same of a ray that is looked at alone."""
 LOST = 0.3
 """Share of the waves that rays beyond the end of the fan may have at a point that is still OK."""
 FADED = 1e-3
 """Wave at the end of the rays below which no longer ones are asked for."""
-SHORT = 0.1
-"""Share of the rays, those that decay least, by which the end of a fan is judged."""
 
 CROSSED = {ELECTRIC_SOFT: (1, ELECTRIC_HARD), ELECTRIC_HARD: (-1, ELECTRIC_SOFT)}
 """Polarisations of a conductor and the other of each, with the sign of their coupling."""
-STRONG = 0.5
-"""Size of the coupling of polarisations from which its expansion fails."""
-VARIES, LEANS = 0.3, 0.5
-"""What ρρ'' and r - 1 turn of a conductor's polarisations: of three ellipsoids."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +139,7 @@ def ray_sum(
         folded = total_of(np.where(size > 0, size * bent, 0.0), observer, count)
         root = total_of(np.where(size > 0, size**2 * bent, 0.0), observer, count)
         narrow = (size > 0) & (tube_share(rays, shed.reach) * fock_scale(wavenumber, rays.curvature[1]) < NARROW)
-        caustic = (merging > MERGED * strength) | (folded > FOLDED * strength)
+        caustic = (merging > 0.04 * strength) | (folded > 0.008 * strength)
         error = np.sqrt(total_of(own_error, observer, count) ** 2 + root + merging**2 + lost**2)
     caustic[observer[narrow]] = True
     ended = np.zeros(count, dtype=bool)
@@ -205,10 +189,10 @@ def own_error(
         else:
             growing = np.zeros_like(size)
             leading = of.leading * first_order_share(rays, height, wavenumber) * small
-            share = np.linalg.norm([CLOSE * small, of.varies_near * varying, leading], axis=0)
+            share = np.linalg.norm([0.3 * small, of.varies_near * varying, leading], axis=0)
         error = size * np.minimum(share, 1.0) + (change if order == 1 else 0.0)
         if mixed is not None:
-            error = np.hypot(error, MIXED * np.minimum(growing, 1.0) * mixed)
+            error = np.hypot(error, 0.8 * np.minimum(growing, 1.0) * mixed)
     return np.asarray(np.where(size > 0, error, 0.0))
 
 
@@ -285,13 +269,13 @@ def merging_of(
 
 
 def fan_decay(fan: RayFan, wavenumber: float, boundary: Boundary) -> tuple[float, float]:
-    """Decay of the first mode by xi, and xi at the end of the rays that decay least; infinite if none goes so far."""
+    """Decay of the first mode by xi, and xi at the end of the tenth that decays least; infinite if none goes so far."""
     whole = fan.status == RayStatus.OK
     if not np.any(whole):
         return 1.0, np.inf
     curvature = np.array(np.median(np.maximum(fan.curvature[whole, 0], 0.0)))
     decay = slowest_decay(boundary, fock_scale(wavenumber, curvature[None]), fan.points[whole, 0])
-    return decay, float(np.cbrt(wavenumber / 2) * np.quantile(fan.attenuation[whole, -1], SHORT))
+    return decay, float(np.cbrt(wavenumber / 2) * np.quantile(fan.attenuation[whole, -1], 0.1))
 
 
 def gradient_coupling(rays: RayPoints, wavenumber: float) -> ComplexArray:
@@ -322,7 +306,7 @@ def strong_coupling(rays: RayPoints, wavenumber: float, boundary: Boundary) -> B
     """Whether the wave of the other polarisation is too large a part of a ray's for an expansion (n,)."""
     if boundary not in CROSSED:
         return np.zeros(rays.alive.shape, dtype=bool)
-    return np.asarray(~(np.abs(gradient_coupling(rays, wavenumber)) < STRONG))
+    return np.asarray(~(np.abs(gradient_coupling(rays, wavenumber)) < 0.5))
 
 
 def turning(rays: RayPoints, wavenumber: float) -> FloatArray:
@@ -332,8 +316,7 @@ def turning(rays: RayPoints, wavenumber: float) -> FloatArray:
     """
     ends = zip(transverse_ratios(rays), scales(rays, wavenumber), rays.radius_rate, rays.radius_bend, strict=True)
     unlike = [
-        np.hypot(VARIES * (np.abs(bend) + rate**2), LEANS * np.minimum(np.abs(r - 1), 1)) / m**2
-        for r, m, rate, bend in ends
+        np.hypot(0.3 * (np.abs(bend) + rate**2), 0.5 * np.minimum(np.abs(r - 1), 1)) / m**2 for r, m, rate, bend in ends
     ]
     xi = np.maximum(fock_parameter(rays, wavenumber), LEAST_XI)
     return np.asarray(np.minimum(np.mean(unlike, axis=0) * xi, 1.0))

@@ -28,9 +28,8 @@ Sources: [KLS56] for the series, [P79] for P; Derivations, F13, and F18 for what
 import numpy as np
 
 from creeping._typing import BoolArray, ComplexArray, FloatArray
-from creeping.field.boundary import Boundary
-from creeping.field.creeping_modes import fock_scale
-from creeping.field.special.fock import FARTHEST, pekeris, pekeris_slope
+from creeping.field.boundary import Boundary, fock_scale
+from creeping.field.fock import FARTHEST, pekeris, pekeris_slope
 from creeping.field.waves.shed_wave import limited, smoothstep
 from creeping.rays.specular import SpecularPoints
 

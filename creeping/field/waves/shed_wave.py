@@ -21,7 +21,7 @@ the distance from the source to the attachment point and e = ρ1/(m1 R), each mo
 
     exp{i τ'² e/4 + i τ³ e³/24} (1 + τ e²/4),   τ' = τ + c/m1²
 
-the first factor of order 1/m1, the others of second order and more; c is the decay of `creeping.field.creeping_modes`.
+the first factor of order 1/m1, the others of second order and more; c is the decay of `creeping.field.boundary`.
 What is left out is of the size τ⁴ e⁵/64 and (τ e²/4)², and where curvature varies at the line τ³ e ρ1'/m1.
 
 Sources: [AS64, sec. 9.3]; Derivations, F4 to F7 and R19.
@@ -30,20 +30,16 @@ Sources: [AS64, sec. 9.3]; Derivations, F4 to F7 and R19.
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
+from creeping.field.airy import MODES, Modes
 from creeping.field.arguments import fock_parameter, mean_scale, scales, transverse_ratios
-from creeping.field.boundary import Boundary
-from creeping.field.creeping_modes import BETA, decay_slopes, decay_terms, modes_of
-from creeping.field.special.airy import MODES, Modes
-from creeping.field.special.fock import SERIES, pekeris_slope, pekeris_star, pole
+from creeping.field.boundary import BETA, Boundary, decay_slopes, decay_terms, modes_of
+from creeping.field.fock import SERIES, pekeris_slope, pekeris_star, pole
 from creeping.geometry.surface import memo
 from creeping.kernels.threads import in_slices
 from creeping.rays.quantities import RayPoints
 
 SECOND_ORDER = (0.5, 0.9)
 """ξ between which the series of second order takes over."""
-
-SOURCE_VARIES, NEXT = 1 / 16, 2.0
-"""Weight of τ³ e ρ1'/m1 in the error, and how much is added to |τ| of the first mode at ξ = 0."""
 
 
 def smoothstep(x: FloatArray, start: float, end: float) -> FloatArray:
@@ -289,12 +285,10 @@ def _by_modes(
 
 def _numbers_of(rays: RayPoints) -> FloatArray:
     """What the sum takes of rays, whatever the frequency and boundary: (lanes, n), whole blocks, kept with the rays."""
-    from creeping.field.kernels.ray_profile import LANES
     from creeping.kernels.block import BLOCK
 
     def make() -> FloatArray:
         n = len(rays.time)
-        found = np.zeros((LANES, -(-n // BLOCK) * BLOCK))
         curved = [kappa > 0 for kappa in rays.curvature]
         ends = (
             [np.cbrt(2 * np.maximum(kappa, 0.0)) for kappa in rays.curvature],
@@ -303,8 +297,8 @@ def _numbers_of(rays: RayPoints) -> FloatArray:
             [np.where(c, np.nan_to_num(b), 0.0) for c, b in zip(curved, rays.radius_bend, strict=True)],
         )
         # in the order of the lanes: what is of both ends stands side by side
-        found[:, :n] = np.stack([*rays.integrals[:, 1:].T, *(end for pair in ends for end in pair)])
-        return found
+        rows = np.stack([*rays.integrals[:, 1:].T, *(end for pair in ends for end in pair)])
+        return np.pad(rows, ((0, 0), (0, -n % BLOCK)))
 
     return memo(rays, "numbers of the sum over modes", make)
 
@@ -348,12 +342,12 @@ def of_source(rays: RayPoints, modes: Modes, wavenumber: float, boundary: Bounda
 def left_out(rays: RayPoints, wavenumber: float, boundary: Boundary) -> FloatArray:
     """Share of a wave (...) that its source has beyond these factors: by the first mode, and more next to the line.
 
-    By how much more there is from spheres, the weight of varying curvature from an ellipsoid.
+    How much more, 2, is from spheres, the weight 1/16 of varying curvature from an ellipsoid.
     """
     if not np.any(rays.opening > 0):
         return np.zeros(rays.time.shape)
     e = nearness(rays, wavenumber)
     first = np.abs(modes_of(boundary, mean_scale(rays, wavenumber)).tau[..., 0])
-    tau = first + NEXT * np.exp(-0.5 * fock_parameter(rays, wavenumber))
-    varying = SOURCE_VARIES * first**3 * e * np.abs(rays.radius_rate[0]) / scales(rays, wavenumber)[0]
+    tau = first + 2 * np.exp(-0.5 * fock_parameter(rays, wavenumber))
+    varying = first**3 / 16 * e * np.abs(rays.radius_rate[0]) / scales(rays, wavenumber)[0]
     return np.asarray(np.where(e > 0, tau**4 * e**5 / 64 + (tau * e**2 / 4) ** 2 + varying, 0.0))

@@ -7,8 +7,7 @@ import shared_bodies as sc
 import creeping as cr
 from creeping.field.boundary import ELECTRIC_HARD, HARD
 from creeping.field.equation import effort
-from creeping.field.marching.fan_waves import fan_waves
-from creeping.field.waves.strip_waves import modes_on_strip
+from creeping.field.marching.fan_waves import fan_waves, modes_on_strip
 from creeping.geometry.quadrature import body_nodes
 from creeping.rays.ends import RayStatus
 from studies.accuracy import point_coverage

@@ -9,7 +9,7 @@ import creeping as cr
 from creeping.errors import InvalidInputError
 from creeping.field import near, routes
 from creeping.field.body_currents import cached_currents
-from creeping.field.problem import Problem
+from creeping.field.routes import Problem
 from creeping.shadow.attachment import occluded
 
 OBLIQUE = np.array([0.36, 0.48, 0.8])

@@ -5,7 +5,7 @@ import pytest
 from scipy.special import ai_zeros, airy
 from tolerances import MODE, PRINTED
 
-from creeping.field.special.airy import CONSTANTS, hard_modes, impedance_modes, soft_modes, w1
+from creeping.field.airy import Modes, hard_modes, impedance_modes, soft_modes, w1
 
 TURN = np.exp(1j * np.pi / 3)
 # FORMULAS, section 3: the first three roots
@@ -127,7 +127,7 @@ def test_constants_depend_on_their_own_q_alone(eta):
     together = impedance_modes(q)
     for some in (slice(3, 4), slice(10, 60), slice(None, None, 7)):
         alone = impedance_modes(q[some])
-        for name in CONSTANTS:
+        for name in Modes._fields:
             np.testing.assert_array_equal(getattr(together, name)[some], getattr(alone, name))
     # the root's own equation, by the library's Airy functions
     value, slope = w1(together.tau[m < 5])

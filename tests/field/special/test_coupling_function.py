@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from creeping.field.special.airy import DEEP, SERIES, coupling_function, hard_modes, soft_coupling_function, soft_modes
+from creeping.field.airy import DEEP, SERIES, coupling_function, hard_modes, soft_coupling_function, soft_modes
 
 
 @pytest.mark.parametrize("power", [0, 1, 2])

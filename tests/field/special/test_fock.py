@@ -5,9 +5,9 @@ import pytest
 from scipy.integrate import quad
 from tolerances import DIFFERENCE, FOCK_SEAM, FOCK_TABLE, PRINTED
 
-from creeping.field.special import fock
-from creeping.field.special.airy import soft_modes
-from creeping.field.special.fock import boundary_modes, height_gain, near_pekeris
+from creeping.field import fock
+from creeping.field.airy import soft_modes
+from creeping.field.fock import boundary_modes, height_gain, near_pekeris
 
 QUARTER = np.exp(0.25j * np.pi)
 BOUNDARIES = [None, 0.0, 1j, 2 + 1j, 5j]

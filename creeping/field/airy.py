@@ -24,8 +24,9 @@ The a_j grow like Γ(j), 1/Γ(μ) falls faster: the series converges everywhere.
 Sources: [F65], [L59]; [F65], [L59], [PW81]; Derivations, F1 and F25.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import cache, lru_cache
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.special import ai_zeros, airy, airye, rgamma
@@ -34,30 +35,16 @@ from creeping._typing import ArrayLike, ComplexArray, FloatArray
 
 MODES = 10
 """Modes summed; with them the series holds to 4e-4 at xi = 0.7 and to 1e-7 at xi = 1.3."""
-FAR, TERMS = 9.0, 17
-"""|z| beyond which the expansion of Ai is used, and its terms: the next one is 2e-13 there,"""
-SECTOR = 2.1
-"""within this angle of the positive axis, where the other exponential is small against it,"""
-FARTHEST = 500.0
-"""and |z| beyond which it is used everywhere, for library routines give up."""
-SMALLEST = 1e-9
-"""Step in q below which roots are taken as they are: q lies on a branch point, where two of them are one."""
-CHEBYSHEV, SMOOTH = 24, 1e-10
-"""Nodes of a table of constants over an octave of |q|, and its error, as a share of the largest, up to which it
-serves."""
-LOWEST, OCTAVES = -10, 512
-"""Octave of |q| below which there are no tables, and how many are kept."""
-CONSTANTS = ("tau", "residue", "m0", "q_m0", "surface")
 FIRST, RATIO = 0.05, 1.02
 """Least |q|, and ratio of neighbours, at which roots are kept; Newton goes on from the node below."""
 
 TURN = np.exp(2j * np.pi / 3)
 W1 = 2 * np.sqrt(np.pi) * np.exp(1j * np.pi / 6)
 
-SERIES, COUPLING_FUNCTION_TERMS = 1.5, 40
-"""ξ up to which the series in powers of ξ^(3/2) serves, and its terms: good to 1e-13 there."""
-COUPLING_FUNCTION_MODES, DEEP, FEW = 16, 4.0, 5
-"""Modes summed beyond, to 1e-10, and from DEEP on."""
+SERIES = 1.5
+"""ξ up to which the series in powers of ξ^(3/2) serves, forty terms of it: good to 1e-13 there."""
+DEEP, FEW = 4.0, 5
+"""ξ from which on so few modes are summed, before it sixteen: to 1e-10."""
 _BRANCHES: dict[tuple[complex, int], tuple[list[complex], list[ComplexArray]]] = {}
 
 
@@ -70,12 +57,13 @@ def w1(t: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
 def scaled_ai(z: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """Ai and Ai' without their factor e^{-ζ}, and ζ = (2/3) z^(3/2), principal branch, any shape.
 
-    Beyond |z| = FAR, away from the negative axis, by their expansions [AS64, sec. 10.4]: a tenth of the library's time.
+    Beyond |z| = 9, within 2.1 of the positive axis, where the other exponential is small, by their expansions
+    [AS64, sec. 10.4]: a tenth of the library's time. Beyond 500 everywhere, for library routines give up.
     """
     z = np.asarray(z, dtype=complex)
     root = np.sqrt(z)
     zeta = 2 / 3 * z * root
-    far = (np.abs(z) > FAR) & ((np.abs(np.angle(z)) < SECTOR) | (np.abs(z) > FARTHEST))
+    far = (np.abs(z) > 9) & ((np.abs(np.angle(z)) < 2.1) | (np.abs(z) > 500))
     if not np.any(far):
         value, slope, _, _ = airye(z)
         return value, slope, zeta
@@ -94,11 +82,11 @@ def scaled_ai(z: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray
 
 @cache
 def _expansion() -> tuple[FloatArray, FloatArray]:
-    """Coefficients of powers of -1/ζ, signs included, in the expansions of Ai and Ai'."""
+    """Coefficients of powers of -1/ζ, signs included, in the expansions of Ai and Ai': the next is 2e-13 at |z| = 9."""
     u = [1.0]
-    for k in range(1, TERMS):
+    for k in range(1, 17):
         u.append(u[-1] * (6 * k - 5) * (6 * k - 3) * (6 * k - 1) / (216 * k * (2 * k - 1)))
-    number = np.arange(TERMS)
+    number = np.arange(17)
     sign = (-1.0) ** number
     return sign * np.array(u), -sign * np.array(u) * (6 * number + 1) / (6 * number - 1)
 
@@ -122,8 +110,7 @@ def scaled_w2(t: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray
     return factor * value, factor / TURN * slope, zeta
 
 
-@dataclass(frozen=True)
-class Modes:
+class Modes(NamedTuple):
     """Roots and constants of the creeping modes of one boundary, or of a boundary that varies.
 
     Attributes
@@ -185,41 +172,35 @@ def impedance_modes(q: ArrayLike, n: int = MODES) -> Modes:
     """
     q = np.asarray(q, dtype=complex)
     flat = q.ravel()
-    table = np.empty((len(flat), len(CONSTANTS), n), dtype=complex)
-    octave = np.floor(np.log2(np.maximum(np.abs(flat), 2.0 ** (LOWEST - 1)))).astype(int)
+    table = np.empty((len(flat), len(Modes._fields), n), dtype=complex)
+    octave = np.floor(np.log2(np.maximum(np.abs(flat), 2.0**-11))).astype(int)
     # tables of fixed octaves, so that a value depends on its own q alone
     for number in np.unique(octave):
         mine = octave == number
-        series = _octave(_argument(flat), int(number), n) if number >= LOWEST else None
+        series = _octave(_argument(flat), int(number), n) if number >= -10 else None
         if series is None:
-            table[mine] = _stacked(_at(flat[mine], _argument(flat), n))
+            table[mine] = np.stack(_at(flat[mine], _argument(flat), n), axis=1)
         else:
             place = 2 * (np.log2(np.abs(flat[mine])) - number) - 1
-            table[mine] = np.polynomial.chebyshev.chebval(place, series).T.reshape(-1, len(CONSTANTS), n)
-    table = table.reshape(*q.shape, len(CONSTANTS), n)
-    return Modes(*(table[..., k, :] for k in range(len(CONSTANTS))))
+            table[mine] = np.polynomial.chebyshev.chebval(place, series).T.reshape(-1, *table.shape[1:])
+    return Modes(*np.moveaxis(table.reshape(*q.shape, *table.shape[1:]), -2, 0))
 
 
-@lru_cache(OCTAVES)
+@lru_cache(512)
 def _octave(phase: complex, number: int, n: int) -> ComplexArray | None:
     """Chebyshev series in log |q| from 2^number on, an octave; None where it is not smooth, beside a branch point."""
-    unit = np.cos(np.pi * (np.arange(CHEBYSHEV) + 0.5) / CHEBYSHEV)
+    unit = np.cos(np.pi * (np.arange(24) + 0.5) / 24)
 
     def exact(at: FloatArray) -> ComplexArray:
-        return _stacked(_at(np.asarray(2.0 ** (number + (at + 1) / 2) * phase, dtype=complex), phase, n))
+        return np.stack(_at(np.asarray(2.0 ** (number + (at + 1) / 2) * phase, dtype=complex), phase, n), axis=1)
 
     values = exact(unit)
-    series = np.polynomial.chebyshev.chebfit(unit, values.reshape(CHEBYSHEV, -1), CHEBYSHEV - 1)
+    series = np.polynomial.chebyshev.chebfit(unit, values.reshape(24, -1), 23)
     probes = np.linspace(-0.97, 0.93, 9)
-    found = np.polynomial.chebyshev.chebval(probes, series).T.reshape(len(probes), len(CONSTANTS), n)
+    found = np.polynomial.chebyshev.chebval(probes, series).T.reshape(len(probes), *values.shape[1:])
     # residues of a bound surface wave underflow to 0
     largest = np.maximum(np.max(np.abs(values), axis=0), 1e-300)
-    return np.asarray(series) if np.max(np.abs(found - exact(probes)) / largest) < SMOOTH else None
-
-
-def _stacked(modes: Modes) -> ComplexArray:
-    """All constants of modes (m, n): (m, constants, n)."""
-    return np.stack([getattr(modes, name) for name in CONSTANTS], axis=1)
+    return np.asarray(series) if np.max(np.abs(found - exact(probes)) / largest) < 1e-10 else None
 
 
 def _argument(q: ComplexArray) -> complex:
@@ -271,7 +252,8 @@ def _continue(start: complex, end: complex, roots: ComplexArray) -> tuple[comple
             middle = start + 0.5 * step * ray
             half = roots + 0.5 * step * ray / delta
             found = _newton(roots + step * ray / (half - middle * middle), following)
-            if step < SMALLEST or (np.all(np.isfinite(found)) and _apart(found, roots, step)):
+            # where q lies on a branch point two roots are one, and taken as they are
+            if step < 1e-9 or (np.all(np.isfinite(found)) and _apart(found, roots, step)):
                 break
             step *= 0.5
         start, roots = following, found
@@ -325,22 +307,33 @@ def _constants(tau: ComplexArray, *, soft: bool) -> Modes:
 
 
 @cache
-def _ratio_terms() -> tuple[FloatArray, FloatArray]:
-    """Coefficients of t^(-3j/2) in √t R and in t R²: (TERMS,), (TERMS,)."""
-    a = np.zeros(COUPLING_FUNCTION_TERMS)
+def _terms(power: int, kind: Literal["R", "R²", "S"]) -> ComplexArray:
+    """Coefficients of ξ^(3j/2) of V_n ξ^n, of the integral of R² over √ξ, or of U_n ξ^n: (terms,)."""
+    # of t^(-3j/2) in √t R or S/√t, by their equations
+    a = np.zeros(40)
     a[0] = 1.0
-    for n in range(1, COUPLING_FUNCTION_TERMS):
-        a[n] = 0.5 * ((1.5 * n - 1.0) * a[n - 1] - a[1:n] @ a[n - 1 : 0 : -1])
-    return a, np.convolve(a, a)[:COUPLING_FUNCTION_TERMS]
+    for n in range(1, len(a)):
+        a[n] = 0.5 * ((1.5 * n - (2.0 if kind == "S" else 1.0)) * a[n - 1] - a[1:n] @ a[n - 1 : 0 : -1])
+    if kind == "R²":
+        a = np.convolve(a, a)[: len(a)]
+    mu = {"R": 0.5, "R²": 1.0, "S": -0.5}[kind] + 1.5 * np.arange(len(a)) - power
+    factor = (-2j if kind == "S" else 1) * np.sqrt(np.pi) * np.exp(-0.25j * np.pi)
+    return np.asarray(a * np.exp(0.5j * np.pi * mu) * rgamma(mu) * factor)
 
 
-@cache
-def _series_terms(power: int, squared: bool) -> ComplexArray:
-    """Coefficients of ξ^(3j/2) of V_n ξ^n, or of the integral of R² over √ξ: (TERMS,)."""
-    plain, square = _ratio_terms()
-    mu = (1.0 if squared else 0.5) + 1.5 * np.arange(COUPLING_FUNCTION_TERMS) - power
-    factor = np.sqrt(np.pi) * np.exp(-0.25j * np.pi)
-    return np.asarray((square if squared else plain) * np.exp(0.5j * np.pi * mu) * rgamma(mu) * factor)
+def _by_series_and_modes(
+    xi: FloatArray, power: int, kind: Literal["R", "R²", "S"], far: Callable[[FloatArray, int], ComplexArray]
+) -> ComplexArray:
+    """A coupling function: the series up to SERIES, ``far(xi (n, 1), modes)`` of so many modes (n,) beyond."""
+    xi = np.asarray(xi, dtype=float)
+    out = np.empty(xi.shape, dtype=complex)
+    small, deep = xi <= SERIES, xi > DEEP
+    near = xi[small]
+    shift = np.sqrt(near) if kind == "R²" else near ** (-float(power))
+    out[small] = shift * np.polynomial.polynomial.polyval(near**1.5, _terms(power, kind))
+    for some, count in ((~small & ~deep, 16), (deep, FEW)):
+        out[some] = far(xi[some, None], count)
+    return out
 
 
 def coupling_function(xi: FloatArray, power: int = 0, *, squared: bool = False) -> ComplexArray:
@@ -351,30 +344,14 @@ def coupling_function(xi: FloatArray, power: int = 0, *, squared: bool = False) 
     >>> complex(coupling_function(np.array(1.0)).round(6))
     (0.699914+0.213383j)
     """
-    xi = np.asarray(xi, dtype=float)
-    out = np.empty(xi.shape, dtype=complex)
-    small = xi <= SERIES
-    near = xi[small]
-    shift = np.sqrt(near) if squared else near ** (-float(power))
-    out[small] = shift * np.polynomial.polynomial.polyval(near**1.5, _series_terms(power, squared))
-    deep = xi > DEEP
-    for some, count in ((~small & ~deep, COUPLING_FUNCTION_MODES), (deep, FEW)):
-        far, tau = xi[some, None], hard_modes(count).tau
-        residues = (1j * far - 1 / tau) / tau**2 if squared else tau ** (power - 1)
-        total = np.sum(residues * np.exp(1j * far * tau), axis=-1)
-        out[some] = np.exp(0.25j * np.pi) * np.sqrt(np.pi * xi[some]) * total
-    return out
 
+    def far(xi: FloatArray, count: int) -> ComplexArray:
+        tau = hard_modes(count).tau
+        residues = (1j * xi - 1 / tau) / tau**2 if squared else tau ** (power - 1)
+        total = np.sum(residues * np.exp(1j * xi * tau), axis=-1)
+        return np.asarray(np.exp(0.25j * np.pi) * np.sqrt(np.pi * xi[:, 0]) * total)
 
-@cache
-def _soft_terms(power: int) -> ComplexArray:
-    """Coefficients of ξ^(3j/2) of U_n ξ^n: (TERMS,)."""
-    s = np.zeros(COUPLING_FUNCTION_TERMS)
-    s[0] = 1.0
-    for n in range(1, COUPLING_FUNCTION_TERMS):
-        s[n] = 0.5 * ((1.5 * n - 2.0) * s[n - 1] - s[1:n] @ s[n - 1 : 0 : -1])
-    mu = -0.5 + 1.5 * np.arange(COUPLING_FUNCTION_TERMS) - power
-    return np.asarray(s * np.exp(0.5j * np.pi * mu) * rgamma(mu) * (-2j * np.sqrt(np.pi) * np.exp(-0.25j * np.pi)))
+    return _by_series_and_modes(xi, power, "R²" if squared else "R", far)
 
 
 def soft_coupling_function(xi: FloatArray, power: int = 0) -> ComplexArray:
@@ -385,12 +362,10 @@ def soft_coupling_function(xi: FloatArray, power: int = 0) -> ComplexArray:
     >>> complex(soft_coupling_function(np.array(1.0)).round(6))
     (0.440321+0.303544j)
     """
-    xi = np.asarray(xi, dtype=float)
-    out = np.empty(xi.shape, dtype=complex)
-    small, deep = xi <= SERIES, xi > DEEP
-    out[small] = xi[small] ** (-float(power)) * np.polynomial.polynomial.polyval(xi[small] ** 1.5, _soft_terms(power))
-    for some, count in ((~small & ~deep, COUPLING_FUNCTION_MODES), (deep, FEW)):
+
+    def far(xi: FloatArray, count: int) -> ComplexArray:
         tau = soft_modes(count).tau
-        total = np.sum(tau**power * np.exp(1j * xi[some, None] * tau), axis=-1)
-        out[some] = 2 * np.exp(-0.25j * np.pi) * np.sqrt(np.pi) * xi[some] ** 1.5 * total
-    return out
+        total = np.sum(tau**power * np.exp(1j * xi * tau), axis=-1)
+        return np.asarray(2 * np.exp(-0.25j * np.pi) * np.sqrt(np.pi) * xi[:, 0] ** 1.5 * total)
+
+    return _by_series_and_modes(xi, power, "S", far)

@@ -27,7 +27,7 @@ import numpy as np
 from scipy.special import airy, wofz
 
 from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
-from creeping.field.special.airy import (
+from creeping.field.airy import (
     MODES,
     TURN,
     W1,
@@ -45,12 +45,8 @@ LIT = -2.5
 """Below it the line of steepest descent is used."""
 SERIES = 2.5
 """Above it ten modes are good to 1e-9."""
-MANY, RATIO = 300, 1.12
-"""Number of different q above which tables are interpolated, and the ratio of their |q|."""
 FARTHEST = -200.0
 """Beyond it the reflection coefficient is taken as constant, an error below 1e-6."""
-
-_DOWN = np.exp(-1j * np.pi / 6)
 
 FAR_HEIGHT = 40.0
 """Largest Y of the integral with height gain; beyond it the observer is far."""
@@ -76,14 +72,11 @@ def _path() -> _Path:
     """Gauss panels on both legs."""
     legs = []
     # reaches: the integrands fall below 1e-12 of their maximum for LIT <= ξ <= SERIES
-    for turn, reach, panels in ((_DOWN, 24.0, 14), (TURN, 24.0, 14)):
-        nodes, weights = np.polynomial.legendre.leggauss(16)
-        edges = np.linspace(0, reach, panels + 1)
-        r = (edges[:-1, None] + np.diff(edges)[:, None] * (nodes + 1) / 2).ravel()
-        w = (np.diff(edges)[:, None] * weights / 2).ravel()
+    r, w = (24.0 * part for part in _panels(14))
+    for turn in (np.exp(-1j * np.pi / 6), TURN):
         t = r * turn
         # numerator: v on the lower leg, w2/2i on the upper one
-        upper, upper_slope, rise = scaled_v(t) if turn is _DOWN else scaled_w2(t)
+        upper, upper_slope, rise = scaled_v(t) if turn.imag < 0 else scaled_w2(t)
         lower, lower_slope, fall = scaled_w1(t)
         legs.append((t, w * turn, lower, lower_slope, upper, upper_slope, fall, rise))
     return _Path(*(np.concatenate(parts) for parts in zip(*legs, strict=True)))
@@ -187,7 +180,7 @@ def _evaluate(which: str, xi: FloatArray, q: ComplexArray | float | None, power:
     full_xi, full_q = np.broadcast_arrays(xi, np.asarray(q, dtype=complex))
     shape, full_xi, full_q = full_xi.shape, full_xi.ravel(), full_q.ravel()
     # the far field keeps to one way, whatever the number of rays that go together
-    if len(full_q) < MANY or not which.startswith("surface") or not _of_one_argument(full_q):
+    if len(full_q) < 300 or not which.startswith("surface") or not _of_one_argument(full_q):
         return _direct(which, full_xi, full_q, power).reshape(shape)
     return _between_tables(which, full_xi, full_q, power).reshape(shape)
 
@@ -209,7 +202,8 @@ def _between_tables(which: str, xi: FloatArray, q: ComplexArray, power: int) -> 
         return out
     # the argument without its rounding, for all q of a boundary to meet the same tables
     phase = complex(np.round(np.exp(1j * np.angle(q[np.argmax(np.abs(q))])), 12))
-    place = np.log(np.abs(q)) / np.log(RATIO)
+    ratio = 1.12
+    place = np.log(np.abs(q)) / np.log(ratio)
     first = np.floor(place).astype(int) - 3
     out = np.zeros(len(xi), dtype=complex)
     for number in range(first.min(), first.max() + 8):
@@ -218,7 +212,7 @@ def _between_tables(which: str, xi: FloatArray, q: ComplexArray, power: int) -> 
             others = first[inside, None] + np.arange(8)
             gaps, apart = place[inside, None] - others, number - others
             weight = np.prod(np.where(apart == 0, 1.0, gaps / np.where(apart == 0, 1, apart)), axis=1)
-            out[inside] += weight * _tabulated(which, xi[inside], RATIO**number * phase, power)
+            out[inside] += weight * _tabulated(which, xi[inside], ratio**number * phase, power)
     return out
 
 

@@ -1,1 +1,0 @@
-"""Special functions of diffraction by smooth bodies: Airy, Fock and Pekeris."""
