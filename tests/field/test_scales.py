@@ -17,6 +17,8 @@ BOUNDARIES = {"soft": "soft", "hard": "hard", "impedance": cr.ImpedanceBoundary(
 SCALES = [1e-6, pytest.param(1e6, marks=pytest.mark.slow)]
 STORED = 1e-9
 """Fields by currents and at points, whose nodes scale with the body: what is left is rounding."""
+SINGLE = 1e-6
+"""Fields of currents that are solved, whose matrix is in single precision: 1e-7 of the largest."""
 ENDS = 1e-2
 """Errors of what is solved, in which the last step of the solution is: single precision is in it."""
 TRACED = 5e-5
@@ -45,6 +47,8 @@ def far(s, kind, method):
 @pytest.mark.parametrize("method, tolerance", [("currents", STORED), ("rays", TRACED)])
 def test_far_field(method, kind, tolerance, scale):
     one, other = far(1.0, kind, method), far(scale, kind, method)
+    if np.any(one.method == "equation"):
+        tolerance = SINGLE
     for part, values in (one.parts | {"total": one.total}).items():
         np.testing.assert_allclose(
             (other.total if part == "total" else other.parts[part]) / scale,
