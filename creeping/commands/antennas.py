@@ -39,7 +39,8 @@ Size = Annotated[
     float | None,
     Parameter(
         group=options.OUTPUT,
-        help="Height of each monopole, or length of each slot, L: coupling.sNp has mutual impedances or admittances. "
+        help="Height of each monopole, or length of each slot, L: coupling.sNp has mutual impedances or admittances "
+        "of ports of one kind. "
         "Of points: the distance at which a source on a plane has the transfer ratio 1.",
     ),
 ]
