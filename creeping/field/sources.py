@@ -24,7 +24,7 @@ from creeping.errors import InvalidInputError, SingularIncidenceError
 from creeping.field.arguments import checked, checked_plain, observers_of
 from creeping.field.boundary import BoundaryLike, boundary_name
 from creeping.field.equation.effort import SECONDS, plan_of
-from creeping.field.equation.solving import is_rough, solution_for, solve_together
+from creeping.field.equation.solving import solution_for, solve_together
 from creeping.field.lit_ground import UNKNOWN
 from creeping.field.near import near_field
 from creeping.field.results.labelled import ArrayResult, Tabled, dataset, directed
@@ -202,7 +202,7 @@ def _solved_together(body: Surface, towards: FloatArray, k: float, boundary: Bou
     plan = plan_of(body, k, boundary, incidences=len(towards))
     # rays take 0.2 s for an incidence at least, at ka = 30
     pays = not plan.refused and not plan.effort.coarse and plan.seconds <= SECONDS + 0.2 * len(towards)
-    if pays and not is_rough(body):
+    if pays:
         solve_together(body, -towards, k, boundary)
     return pays
 

@@ -179,8 +179,10 @@ def solve_together(
 ) -> None:
     """Solve the equation for unit directions (m, 3) at once and keep it, if it costs less than SECONDS for one.
 
-    On fine tiles alone, if these are asked for.
+    On fine tiles alone, if these are asked for; else not of a rough body, whose solution nothing takes by itself.
     """
+    if is_rough(body) and not fine:
+        return
     plan = plan_of(body, wavenumber, boundary, incidences=len(directions))
     if not (plan.refused or (fine and plan.effort.coarse)):
         try:
