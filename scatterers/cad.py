@@ -145,6 +145,9 @@ class Cad(FittedBody):
             mean_curvature=np.where(jets.fitted & ~quality.bad, jets.mean, np.nan),
             quality=quality,
             notes=notes | {"repairs": list(found.mesh.repairs)},
+            # in mean edges; cells of one edge would hold too few points
+            narrower=(1.5 * quality.edge_mean, 1.2 * quality.edge_mean),
+            exact=bool(np.all(np.isfinite(found.normals[quality.bad]))),
         )
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from creeping._typing import FloatArray
 from creeping.kernels.cache import private_folder, require_private
 
-SCHEMA = 15
+SCHEMA = 16
 """Counts up with every change of what is stored or of how it is fitted."""
 DIGEST = 32
 NAME = re.compile(r"[a-z]+-[0-9a-f]{24}\.npz")

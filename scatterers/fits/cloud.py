@@ -73,6 +73,9 @@ class PointCloud:
         Spacings that are tried in turn where the fit at ``spacing`` is no body.
     nearer : Nearer or None
         What the second fit is made to, if not to the same; as many points.
+    exact : bool
+        Whether the normals are those of the source itself: then all points are fitted, and the body is not smooth where
+        the fit does not follow them.
     """
 
     points: FloatArray
@@ -89,6 +92,7 @@ class PointCloud:
     smoothing: float | None = None
     narrower: tuple[float, ...] = ()
     nearer: Nearer | None = None
+    exact: bool = False
 
     @property
     def reach(self) -> float:
@@ -259,3 +263,11 @@ def left_at(spline: TensorSpline, points: FloatArray, normals: FloatArray | None
     slope = np.linalg.norm(gradient, axis=1)
     turn = 0.0 if normals is None else np.linalg.norm(gradient / slope[:, None] - normals, axis=1)
     return rms(value / slope), rms(np.asarray(turn))
+
+
+def not_followed(spline: TensorSpline, points: FloatArray, normals: FloatArray) -> FloatArray:
+    """Those of points (n, 3), L, at which a fit does not have about their unit normals (n, 3): (j, 3)."""
+    gradient = spline.gradient(points)
+    turn = np.linalg.norm(gradient / np.linalg.norm(gradient, axis=1, keepdims=True) - normals, axis=1)
+    # more than 0.05 radians, or six times what is usual: coarse triangles err, too
+    return np.asarray(points[~(turn <= max(0.05, 6.0 * float(np.median(turn))))])

@@ -28,7 +28,7 @@ import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.body import Crease
-from scatterers.fits.cloud import FitReport, PieceCloud, curvatures, differences, rms
+from scatterers.fits.cloud import FitReport, PieceCloud, curvatures, differences, not_followed, rms
 from scatterers.fits.patch import (
     SLIGHT,
     SPACING,
@@ -64,16 +64,6 @@ def astray(space: PieceSpace, patches: list[Patch], points: FloatArray, owner: I
         value, gradient = patches[k].fine.value_and_gradient(points[wrong[mine]])
         missed[mine] = np.abs(value) / np.linalg.norm(gradient, axis=1)
     return np.asarray(points[wrong[missed > MISSED * size]])
-
-
-def doubtful(patch: Patch, x: FloatArray, normals: FloatArray) -> FloatArray:
-    """Vertices (k, 3), L, of those of a piece at which its fit does not have about their normals."""
-    if patch.kind != "spline":
-        return np.zeros((0, 3))
-    gradient = patch.fine.gradient(x)
-    turn = np.linalg.norm(gradient / np.linalg.norm(gradient, axis=1, keepdims=True) - normals, axis=1)
-    # more than 0.05 radians, or six times what is usual: coarse triangles err, too
-    return np.asarray(x[~(turn <= max(0.05, 6.0 * float(np.median(turn))))])
 
 
 def rough(patch: Patch, points: FloatArray, size: float) -> bool:
@@ -114,7 +104,8 @@ def fitted_pieces(cloud: PieceCloud, progress: Callable[[str], None]) -> Fit:
         local, x, n = _known(cloud, members)
         # at the border of the members normals are one-sided
         inner = np.unique(local[np.isin(members, own)])
-        doubted.append(doubtful(patch, x[inner], n[inner]))
+        if patch.kind == "spline":
+            doubted.append(not_followed(patch.fine, x[inner], n[inner]))
     points, owner = _spread(vertices[triangles], at_corners, piece)
     creases = tuple(_judged(crease, patches) for crease in cloud.regions.creases(vertices, piece))
     creases += _tips(vertices, triangles, piece, patches)

@@ -23,6 +23,7 @@ from scatterers.fits.cloud import (
     differences,
     left_at,
     normal_curvatures,
+    not_followed,
     principal_curvatures,
     rms,
 )
@@ -45,6 +46,11 @@ def good_fit(cloud: PointCloud, progress: Progress) -> Fit:
     ValueError
         If there is none, or curvatures are too uncertain: on a narrower grid both fits would follow the same noise.
     """
+    if cloud.exact and len(cloud.non_smooth):
+        try:
+            return good_fit(replace(cloud, non_smooth=np.zeros((0, 3))), progress)
+        except NoBodyError as error:
+            progress(f"{error}; points at which it curves too much for their distance are left out")
     # else too few of the points are known for a fit to mean anything
     if len(cloud.non_smooth) and np.mean(cloud.smooth) < 0.1:
         raise ValueError(
@@ -66,6 +72,8 @@ def _checked_fit(cloud: PointCloud, progress: Progress) -> Fit:
     seen = not len(turn) or np.mean(blind) <= 0.05
     # of a mesh that shows too little the fit is to be a body all the same, or a narrower grid is tried
     non_smooth = cloud.non_smooth if cloud.nearer is None or not seen else cloud.nearer.source.vertices[blind]
+    if cloud.exact and not len(non_smooth):
+        non_smooth = not_followed(fine.spline, cloud.points, cloud.normals)
     report, doubt = compared(replace(cloud, non_smooth=non_smooth), fine, coarse, smoothing)
     if not SLOPES[0] <= report.slope[0] <= report.slope[1] <= SLOPES[1] and not len(cloud.non_smooth):
         raise NoBodyError(
@@ -105,7 +113,7 @@ def fits(cloud: PointCloud, progress: Progress) -> tuple[Fitted, Fitted, float]:
     smoothings, most = (1e-6, 1e-5, 1e-4, 1e-3), 1.01 * cloud.noise
     # jets of a mesh that is judged by its fit are no good start, and its samples leave much free
     doubtful = bool(np.isfinite(cloud.uncertain))
-    noisy = bool(cloud.noise)
+    noisy, middle = bool(cloud.noise), mirror_planes(cloud)
 
     def fitted(
         of: PointCloud | Nearer,
@@ -119,6 +127,7 @@ def fits(cloud: PointCloud, progress: Progress) -> tuple[Fitted, Fitted, float]:
             of.normals[some],
             spacing,
             distance=of.distance,
+            middle=middle,
             trusted=cloud.smooth[some] if len(cloud.non_smooth) else None,
             mean_curvature=None if cloud.mean_curvature is None else cloud.mean_curvature[some],
             smoothing=smoothing,
@@ -152,7 +161,52 @@ def fits(cloud: PointCloud, progress: Progress) -> tuple[Fitted, Fitted, float]:
             # between points that are too far apart for it
             other = fitted(cloud.nearer, COARSER * cloud.spacing, smoothing, plain)
     _require_one_body(other, cloud)
-    return fine, other, smoothing
+    return *mirrored(cloud, fine, other), smoothing
+
+
+def mirror_planes(cloud: PointCloud) -> FloatArray:
+    """Where a body would be cut by planes x_i = const that it is its own image in: (3,), L.
+
+    Off such a plane by delta, images of points x are off the body by -2 delta n_i(x).
+    """
+    x, n = cloud.points, cloud.normals
+    middle = 0.5 * (x.min(axis=0) + x.max(axis=0))
+    for axis in range(3):
+        for _ in range(3):
+            image = x.copy()
+            image[:, axis] = 2 * middle[axis] - x[:, axis]
+            off = cloud.distance(image)
+            # others are no images
+            off = np.where(np.abs(off) < cloud.spacing, off, 0.0)
+            middle[axis] += np.sum(off * n[:, axis]) / (2 * np.sum(n[:, axis] ** 2))
+    return np.asarray(middle)
+
+
+def mirrored(cloud: PointCloud, fine: Fitted, coarse: Fitted) -> tuple[Fitted, Fitted]:
+    """Both fits, each the mean of itself and its image by the middle planes of the grid in which the body is its own.
+
+    It is, as far as is known, where the image differs by no more than both fits do: rms over the points, and at most.
+    Fields of a body that is symmetric to rounding take a half, a quarter or an eighth of the unknowns.
+    """
+    if len(cloud.non_smooth):
+        return fine, coarse
+    level = fine.spline.level(cloud.points)
+    doubt = coarse.spline.level(cloud.points) - level
+    for axis in range(3):
+        images = [replace(one.spline, coefficients=np.flip(one.spline.coefficients, axis)) for one in (fine, coarse)]
+        off = images[0].level(cloud.points) - level
+        if rms(off) <= rms(doubt) and np.max(np.abs(off)) <= np.max(np.abs(doubt)):
+            fine, coarse = (
+                _remeasured(cloud, one, 0.5 * (one.spline.coefficients + image.coefficients))
+                for one, image in zip((fine, coarse), images, strict=True)
+            )
+    return fine, coarse
+
+
+def _remeasured(cloud: PointCloud, fitted: Fitted, coefficients: FloatArray) -> Fitted:
+    spline = replace(fitted.spline, coefficients=coefficients)
+    misfit, turn = left_at(spline, cloud.points, cloud.normals)
+    return replace(fitted, spline=spline, misfit=misfit, turn=turn)
 
 
 def compared(cloud: PointCloud, fine: Fitted, coarse: Fitted, smoothing: float) -> tuple[FitReport, float]:

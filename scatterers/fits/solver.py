@@ -79,6 +79,7 @@ def fit(
     spacing: float,
     *,
     distance: Callable[[FloatArray], FloatArray] | None = None,
+    middle: FloatArray | None = None,
     trusted: BoolArray | None = None,
     mean_curvature: FloatArray | None = None,
     smoothing: float = SMOOTHING,
@@ -96,6 +97,8 @@ def fit(
         h, L; about 1.6 to 2 distances between neighbouring points.
     distance : callable, optional
         Signed distance from the body to start from, (m, 3) -> (m,); NaN where it is not known.
+    middle : (3,), L, optional
+        Of the grid, by default that of the points.
     trusted : (n,) bool, optional
         Points that are fitted, by default all; at the others F stays near the distance that it starts from.
     mean_curvature : (n,), 1/L, optional
@@ -121,7 +124,7 @@ def fit(
     """
     # iterations from one look at the curvature to the next
     checked = 20
-    equations = _Equations(points, normals, spacing, smoothing, normal_weight, trusted)
+    equations = _Equations(points, normals, spacing, smoothing, normal_weight, middle, trusted)
     c = equations.start(distance)
     watch = _Watch(equations, mean_curvature)
     r = equations.residual(c, targets=True, rough=not keep_start)
@@ -182,12 +185,17 @@ class _Equations:
         spacing: float,
         smoothing: float,
         normal_weight: float,
+        middle: FloatArray | None = None,
         trusted: BoolArray | None = None,
     ) -> None:
         from scipy.spatial import cKDTree
 
-        low, high = points.min(0) - PADDING * spacing, points.max(0) + PADDING * spacing
-        nodes = np.ceil((high - low) / spacing).astype(np.int64) + 1
+        low, high = points.min(0), points.max(0)
+        middle = 0.5 * (low + high) if middle is None else middle
+        half = np.maximum(high - middle, middle - low) + PADDING * spacing
+        # nodes on the middle planes: there the distance to start from has its kinks
+        cells = np.ceil(half / spacing).astype(np.int64)
+        low, nodes = middle - cells * spacing, 2 * cells + 1
         self.shape = tuple(int(n) + 4 for n in nodes)
         if np.prod(np.array(self.shape, dtype=float)) > MAX_NODES:
             raise ValueError(

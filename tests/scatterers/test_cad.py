@@ -13,6 +13,10 @@ from cad_files import made
 
 import creeping as cr
 import scatterers as sc
+from creeping.field.boundary import CONDUCTOR
+from creeping.field.equation.mirrors import mirrors_of
+from creeping.field.equation.parting import tiles_of
+from creeping.geometry.covering import patches_of
 from creeping.geometry.surface import normal, project
 from scatterers.triangles import cad_file as _cad_files
 from scatterers.triangles.cad_file import CadReading, read_cad
@@ -30,6 +34,9 @@ make.dilate([(3, ball)], 0, 0, 0, 1200, 800, 800)
 write("ellipsoid.step")
 make.addTorus(0, 0, 0, 1000, 500)
 write("torus.step")
+ball = make.addSphere(3, 2, 1, 1)
+make.dilate([(3, ball)], 3, 2, 1, 126, 49, 20)
+write("flat.step")
 make.addBox(0, 0, 0, 1, 1, 1)
 write("box.brep")
 make.addCone(0, 0, 0, 0, 0, 2, 1, 0)
@@ -335,6 +342,23 @@ def test_ellipsoid_against_the_exact_one(files):
     assert off < body.fit.normal_curvature_error < 10 * off
     # that of the exact one is published
     assert cr.shadow_line(body, (1.0, 1.0, 1.0)).length == pytest.approx(6.1340508514, abs=1e-5)
+
+
+def test_ends_that_are_sharper_than_their_points_are_followed_by_normals(files):
+    """Radius 3 mm, points 4 mm apart: jets make nothing of it, normals of the faces do."""
+    body, exact = sc.Cad(files / "flat.step", points=3000, cache=False), sc.Ellipsoid(0.126, 0.049, 0.02)
+    middle = np.array([0.003, 0.002, 0.001])
+    assert body.quality.verdict == "too coarse" and not body.pieces
+    points = exact.forward(directions(np.random.default_rng(4), 500))
+    points = np.concatenate([points, [[0.126, 0, 0], [-0.126, 0, 0]]])
+    assert not np.any(body.non_smooth(points + middle))
+    found, n = project(body, points + middle) - middle, normal(exact, points)
+    assert np.max(np.linalg.norm(found - points, axis=1)) < 1e-4
+    assert np.max(np.linalg.norm(normal(body, found + middle) - n, axis=1)) < 0.1
+    # it is its own mirror image to rounding, as the exact one is, and takes no more tiles
+    tiles = [tiles_of(patches_of(one), 200.0, CONDUCTOR) for one in (body, exact)]
+    assert mirrors_of(tiles[0], CONDUCTOR).flips == ((0,), (1,), (2,))
+    assert len(tiles[0].points) < 1.2 * len(tiles[1].points)
 
 
 def test_second_opening_takes_the_fit_from_the_cache(files, tmp_path, monkeypatch):

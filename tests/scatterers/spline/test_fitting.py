@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+import trimesh
 from body_checks import directions, rms, unit
 
 import scatterers as sc
@@ -204,3 +205,19 @@ def test_parts_that_keep_away_from_the_points_change_their_sign():
     # what comes near to the points is no stray part
     near = np.linalg.norm(where - [1.0, 0, 0], axis=1) < 0.3
     assert not equations._stray(np.where(near, -values, values), np.abs(values)).any()
+
+
+@pytest.mark.parametrize(("depth", "symmetric"), [(0.0, True), (0.003, False)])
+def test_a_body_is_made_its_own_mirror_image_where_it_is_one(depth, symmetric):
+    """A dent at one end of an ellipsoid: not so along that axis, though it is along both others."""
+    mesh = trimesh.creation.icosphere(subdivisions=4)
+    away = np.linalg.norm(mesh.vertices - [1, 0, 0], axis=1)
+    mesh.vertices = mesh.vertices * np.array([1.0, 0.8, 0.6]) * (1 - depth * np.exp(-((3 * away) ** 2)))[:, None]
+    mesh.vertices += np.array([0.31, -0.17, 0.05])
+    body = sc.Mesh(mesh, cache=False)
+    at, middle = np.asarray(mesh.vertices), np.array([0.31, -0.17, 0.05])
+    for axis, same in enumerate((symmetric, True, True)):
+        image = at.copy()
+        image[:, axis] = 2 * middle[axis] - at[:, axis]
+        off = np.max(np.abs(body.level(image) - body.level(at)))
+        assert (off < 1e-7) == same, (axis, off)
