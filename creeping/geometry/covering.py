@@ -1,38 +1,30 @@
 """A body as surfaces that polynomials on the unit square make: what the tiles of its integral equation are cut from.
 
-A coarse mesh of quadrilaterals and triangles is brought onto the body, Lobatto's points of each by each: those of a
-side first, onto the piece on both sides of it, or onto the crease between two pieces, once for both; then those inside,
-which start from Coons's surface through the sides,
+A coarse mesh of quadrilaterals and triangles (`creeping.geometry.coarse_mesh`) is brought onto the body, Lobatto's
+points of each by each: those of a side first, onto the piece on both sides of it, or onto the crease between two
+pieces, once for both; then those inside, which start from Coons's surface through the sides,
 
     x(u, v) = (1 - u) x(0, v) + u x(1, v) + (1 - v) x(u, 0) + v x(u, 1) - bilinear through the corners.
 
 So surfaces of neighbours meet without a gap. A triangle is a square whose side u = 0 is one point: its tip, where it
 has one. A smooth body's squares are those of its charts, where these cover it once (``tiling``). A square that is not
-the body to POSITION and NORMAL is halved.
-
-The coarse mesh has the quadrilaterals around the grid edges that a smooth body crosses; of a body of pieces its
-triangles, joined by two where they make a good quadrilateral: convex, its corners no sharper than SQUARE, and no two
-sides in a row along one crease, between which there is no corner.
+the body to POSITION and NORMAL, or as well as a fitted body is known, is halved.
 
 Sources: [C67], [BT04]; Derivations, B14.
 """
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
-from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import SurfaceError
+from creeping.geometry.coarse_mesh import CoarseMesh, coarse_meshes, tip_vertices
 from creeping.geometry.patches import DEGREE, ENDS, Patches, lobatto, on_squares
-from creeping.geometry.piecewise import is_piecewise, nearest_crease, pieces_of, tips_of
+from creeping.geometry.piecewise import is_piecewise, nearest_crease, pieces_of
 from creeping.geometry.quadrature import nearest_points
-from creeping.geometry.surface import Chart, Surface, memo, normal, size
-from creeping.geometry.tile_rules import SAME
-from creeping.geometry.triangulation import quadrilaterals
+from creeping.geometry.surface import Chart, Surface, memo, size
 
 POSITION, NORMAL = 2e-6, 3e-4
 """What squares may be off the body, in its sizes, and their normals, radians."""
@@ -43,141 +35,11 @@ ROUNDS, TURNS, PARTS = 5, 2.0, 2
 parts along a side of a chart before."""
 BETTER = 0.5
 """What may be amiss of a part over what was of the whole: else it is not parted again."""
-SIDES_OF_PIECES = (1.0, 0.7, 0.5, 0.3)
-"""Longest sides of the triangles of a body of pieces, in its sizes, of the meshes that are tried."""
 WELL, CLOSED = 1e-5, 1e-6
 """What squares may be off the body, in its sizes, and the integral of n over them, as a share of the area: more counts
 against a mesh."""
 STEEP, NEWTON = 0.2, 20
 """Sine of the angle between x_u and x_v, at least: less counts against a mesh; and steps onto a crease."""
-CELLS = (3, 4, 5, 6, 8, 12, 24)
-"""Cells of the meshes of a smooth body; the first that is of the kind of the last is taken."""
-SQUARE = 0.8
-"""Largest |cos| of a corner of the quadrilateral that two triangles make."""
-EVENED = 5
-"""Times that vertices inside pieces move to the middle of their neighbours."""
-MOST = 4000
-"""Triangles of a body of pieces that squares are made of: of more there are too many nodes at any wavenumber."""
-
-
-class CoarseMesh(NamedTuple):
-    """Corners of squares at (0, 0), (1, 0), (1, 1), (0, 1); of a triangle the first is the last again.
-
-    ``places`` are points of the squares (m, n, n, 3) at Lobatto's, of a body that knows them.
-    """
-
-    vertices: FloatArray
-    corners: IntArray
-    pieces: IntArray
-    places: FloatArray | None = None
-
-
-def coarse_mesh(body: Any, share: float) -> CoarseMesh:
-    """A coarse mesh of a body, of pieces with sides of a share of its size."""
-    if not is_piecewise(body):
-        given = body.level, body.gradient, body.bounds
-        *coarser, finest = (partial(quadrilaterals, *given, cells=n, fewest=min(n, 24), mirrored=True) for n in CELLS)
-        vertices, tiles = finest()
-        for mesh in coarser:
-            # a thin body may pass between the points of a coarse grid
-            with suppress(SurfaceError):
-                found = mesh()
-                if len(found[0]) - len(found[1]) == len(vertices) - len(tiles):
-                    vertices, tiles = found
-                    break
-        return CoarseMesh(vertices, tiles, np.zeros(len(tiles), dtype=np.int64))
-    corners, _, pieces = body.tiles(share * size(body))
-    if len(corners) > MOST:
-        raise SurfaceError(f"{len(corners)} triangles are more than the {MOST} that squares are made of")
-    grid = np.round(corners.reshape(-1, 3) / (SAME * size(body))).astype(np.int64)
-    _, first, numbers = np.unique(grid, axis=0, return_index=True, return_inverse=True)
-    vertices, triangles = corners.reshape(-1, 3)[first], numbers.reshape(-1, 3)
-    vertices = _evened(body, vertices, triangles, np.asarray(pieces))
-    return CoarseMesh(vertices, *_paired(vertices, triangles, np.asarray(pieces), tip_vertices(body, vertices)))
-
-
-def _evened(body: Any, vertices: FloatArray, triangles: IntArray, pieces: IntArray) -> FloatArray:
-    """Vertices (n, 3) of which those inside pieces have moved to the middle of their neighbours: no slivers there."""
-    from scipy.sparse import coo_array
-
-    n = len(vertices)
-    owner = np.full(n, -1)
-    owner[triangles] = pieces[:, None]
-    shared = np.zeros(n, dtype=bool)
-    np.logical_or.at(shared, triangles, owner[triangles] != pieces[:, None])
-    free = np.flatnonzero(~shared & (owner >= 0) & ~tip_vertices(body, vertices))
-    ends = triangles[:, [0, 1, 2, 1, 2, 0]].reshape(-1, 2, 3).swapaxes(1, 2).reshape(-1, 2)
-    beside = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(n, n)).tocsr()
-    beside.data[:] = 1.0
-    count = np.asarray(beside.sum(axis=1)).ravel()[free, None]
-    every = pieces_of(body)
-    for _ in range(EVENED if len(free) else 0):
-        moved = (beside @ vertices)[free] / count
-        for number in np.unique(owner[free]):
-            mine = owner[free] == number
-            moved[mine] = nearest_points(every[number], moved[mine])[0]
-        # a place that the piece does not have stays as it was
-        there = np.all(np.isfinite(moved), axis=1)
-        vertices = vertices.copy()
-        vertices[free[there]] = moved[there]
-    return vertices
-
-
-def tip_vertices(body: Any, vertices: FloatArray) -> BoolArray:
-    """Which vertices (n, 3) are tips (n,)."""
-    tips = tips_of(body)[1] if is_piecewise(body) else np.zeros((0, 3))
-    apart = np.linalg.norm(vertices[:, None] - tips, axis=2)
-    return np.asarray(np.min(apart, axis=1, initial=np.inf) < 1e-6 * size(body))
-
-
-def _paired(vertices: FloatArray, triangles: IntArray, pieces: IntArray, tip: BoolArray) -> tuple[IntArray, IntArray]:
-    """Corners of squares that two triangles of a piece make with each other, best first, and of those left alone."""
-    m = len(triangles)
-    # of each side the triangle, and its corners from the one opposite to it
-    turned = np.concatenate([np.roll(triangles, -shift, axis=1) for shift in range(3)])
-    owner = np.tile(np.arange(m), 3)
-    sides = np.sort(turned[:, 1:], axis=1)
-    order = np.lexsort(sides.T)
-    same = np.flatnonzero(np.all(sides[order][1:] == sides[order][:-1], axis=1))
-    one, two = order[same], order[same + 1]
-    fit = (pieces[owner[one]] == pieces[owner[two]]) & (turned[one, 1] == turned[two, 2])
-    one, two = one[fit], two[fit]
-    square = np.stack([turned[one, 0], turned[one, 1], turned[two, 0], turned[one, 2]], axis=1)
-    x = vertices[square]
-    ahead, behind = np.roll(x, -1, axis=1) - x, np.roll(x, 1, axis=1) - x
-    with np.errstate(invalid="ignore", divide="ignore"):
-        cosine = np.sum(ahead * behind, axis=2) / np.linalg.norm(ahead, axis=2) / np.linalg.norm(behind, axis=2)
-    # convex where all corners turn the same way
-    around = np.cross(ahead, behind)
-    convex = np.all(np.sum(around * around.sum(axis=1, keepdims=True), axis=2) > 0, axis=1)
-    # two sides in a row along one crease have no corner between them
-    beyond = np.full(3 * m, -1)
-    fit = np.flatnonzero(pieces[owner[order[same]]] != pieces[owner[order[same + 1]]])
-    beyond[order[same][fit]], beyond[order[same + 1][fit]] = (
-        pieces[owner[order[same + 1]]][fit],
-        pieces[owner[order[same]]][fit],
-    )
-    around = np.stack([beyond[(row + shift * m) % (3 * m)] for row, shift in ((one, 2), (two, 1), (two, 2), (one, 1))])
-    ear = np.any((around >= 0) & (around == np.roll(around, 1, axis=0)), axis=0)
-    worst = np.where(convex & ~ear & ~np.any(tip[square], axis=1), np.max(np.abs(cosine), axis=1), np.inf)
-    taken, squares, owners = np.zeros(m, dtype=bool), [], []
-    for row in np.argsort(worst, kind="stable"):
-        a, b = owner[one[row]], owner[two[row]]
-        if worst[row] > SQUARE:
-            break
-        if not (taken[a] or taken[b]):
-            taken[a] = taken[b] = True
-            squares.append(square[row])
-            owners.append(pieces[a])
-    left = np.flatnonzero(~taken)
-    alone = triangles[left]
-    # the tip first, or the sharpest corner, which is where the square is drawn together
-    x = vertices[alone]
-    opposite = np.linalg.norm(np.roll(x, -1, axis=1) - np.roll(x, 1, axis=1), axis=2)
-    start = np.where(tip[alone].any(axis=1), np.argmax(tip[alone], axis=1), np.argmin(opposite, axis=1))
-    alone = np.take_along_axis(alone, (start[:, None] + np.arange(3)) % 3, axis=1)
-    corners = np.concatenate([np.array(squares, dtype=np.int64).reshape(-1, 4), alone[:, [0, 1, 2, 0]]])
-    return corners, np.concatenate([np.array(owners, dtype=np.int64), pieces[left]])
 
 
 def patches_of(body: Surface) -> Patches:
@@ -213,9 +75,11 @@ def _made(body: Surface) -> Patches | str:
     if hasattr(body, "squares"):
         vertices, places, corners, pieces = body.squares(lobatto(DEGREE))
         return _refined(ground, CoarseMesh(vertices, corners, pieces, places))
-    for share in SIDES_OF_PIECES if is_piecewise(body) else (0.0,):
+    for mesh in coarse_meshes(body):
         try:
-            found = _refined(ground, coarse_mesh(body, share))
+            if isinstance(mesh, SurfaceError):
+                raise mesh
+            found = _refined(ground, mesh)
         except (SurfaceError, ValueError) as error:
             # coarser ones come first
             failure = failure or error
@@ -224,6 +88,8 @@ def _made(body: Surface) -> Patches | str:
         amiss = max(found.off.max() / (WELL * ground.size), found.gap / CLOSED, 1.0) / min(found.angle, STEEP)
         if len(found.off) * amiss**2 < least:
             best, least = found, len(found.off) * amiss**2
+        if not is_piecewise(body):
+            break
     return best or f"no mesh of squares covers the body: {failure}"
 
 
@@ -232,10 +98,9 @@ def _refined(ground: "_Ground", mesh: "CoarseMesh") -> Patches:
     current = _first(ground, mesh)
     done, before = [], np.full(len(current.off), np.inf)
     for turn in range(ROUNDS + 1):
-        off, turned = ground.misfit(current)
-        amiss = np.maximum(off / (POSITION * ground.size), turned / NORMAL)
+        off, amiss, good = ground.misfit(current)
         # what is amiss along a side that a neighbour has too stays with the parts
-        poor = ~(amiss < 1) & ~(amiss > BETTER * before) & (turn < ROUNDS)
+        poor = ~good & ~(amiss > BETTER * before) & (turn < ROUNDS)
         done.append(replace(current, off=off)[~poor])
         if not np.any(poor):
             break
@@ -259,6 +124,8 @@ class _Ground:
         self.body, self.size = body, size(body)
         self.pieces = list(pieces_of(body)) if is_piecewise(body) else [body]
         self.creases = body.creases if is_piecewise(body) else ()
+        second = getattr(body, "coarse_fit", None)
+        self.second = [] if second is None else list(pieces_of(second)) if is_piecewise(body) else [second]
 
     def onto(self, points: FloatArray, pieces: IntArray) -> FloatArray:
         """The nearest points (n, 3) of the pieces with these numbers (n,)."""
@@ -288,8 +155,8 @@ class _Ground:
             x = x - (np.swapaxes(J, 1, 2) @ step)[..., 0]
         return x
 
-    def misfit(self, patches: Patches) -> tuple[FloatArray, FloatArray]:
-        """Distance of squares from the body and angle of their normals to its own, at most (m,), L and radians."""
+    def misfit(self, patches: Patches) -> tuple[FloatArray, FloatArray, BoolArray]:
+        """Distance of squares from the body, L, what is amiss of them, and whether they may stay: (m,) each."""
         q = patches.places.shape[1] - 1
         # the same of mirrored squares
         between = 0.5 * (lobatto(q)[1:] + lobatto(q)[:-1])[[0, 2, -3, -1]]
@@ -297,14 +164,26 @@ class _Ground:
         x, along, across = on_squares(patches.places, at, at)
         n = np.cross(along, across)
         n /= np.linalg.norm(n, axis=-1, keepdims=True)
-        off, turned = np.zeros((2, *x.shape[:3]))
+        # off and turned, and what of both is not known of the body: it differs on another fit
+        found = np.zeros((4, *x.shape[:3]))
         for number in np.unique(patches.pieces):
             mine = patches.pieces == number
-            piece = self.pieces[number]
-            slope = piece.gradient(x[mine])
-            off[mine] = np.abs(piece.level(x[mine])) / np.linalg.norm(slope, axis=-1)
-            turned[mine] = np.linalg.norm(np.cross(n[mine], normal(piece, x[mine])), axis=-1)
-        return np.max(off, axis=(1, 2)), np.max(turned, axis=(1, 2))
+            found[0, mine], own = _distance(self.pieces[number], x[mine])
+            found[1, mine] = np.linalg.norm(np.cross(n[mine], own), axis=-1)
+            if self.second:
+                other, its = _distance(self.second[number], x[mine])
+                found[2:, mine] = other - found[0, mine], np.linalg.norm(its - own, axis=-1)
+        off, turned, unknown, doubt = np.max(np.abs(found), axis=(2, 3))
+        least = POSITION * self.size
+        amiss = np.maximum(off / least, turned / NORMAL)
+        return off, amiss, (off < np.maximum(unknown, least)) & (turned < np.maximum(doubt, NORMAL))
+
+
+def _distance(piece: Any, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Distance of points from a piece, L, and its normal there."""
+    slope = piece.gradient(x)
+    length = np.linalg.norm(slope, axis=-1)
+    return piece.level(x) / length, slope / length[..., None]
 
 
 def _first(ground: _Ground, mesh: CoarseMesh) -> Patches:
@@ -419,8 +298,8 @@ def _of_charts(ground: _Ground, charts: Sequence[Chart]) -> Patches:
             u, v = (low[:, axis, None] + (high - low)[:, axis, None] * t for axis in (0, 1))
             grid = np.broadcast_arrays(u[:, :, None], v[:, None, :])
             current = _smooth(chart.point(np.stack(grid, axis=-1)))
-            off, turned = ground.misfit(current)
-            poor = ~((off < POSITION * ground.size) & (turned < NORMAL)) & (turn < ROUNDS)
+            off, _, good = ground.misfit(current)
+            poor = ~good & (turn < ROUNDS)
             done.append(replace(current, off=off)[~poor])
             if not np.any(poor):
                 break
