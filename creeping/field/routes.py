@@ -35,11 +35,12 @@ from creeping.field.currents.nodes import RAYS, STEPS
 from creeping.field.currents.radiation import grid_cells, may_self_reflect, transformed
 from creeping.field.currents.whole_body import POINTS, SurfaceCurrents
 from creeping.field.equation.effort import expected_seconds_of, plan_of, too_much
+from creeping.field.equation.solving import is_rough
 from creeping.field.lit_ground import convex
 from creeping.field.marching.fan_waves import marchable
 from creeping.field.results.far_result import incident_mix, spherical_frame
 from creeping.field.results.point_result import FieldStatus, PointValues
-from creeping.field.validity_range import validity
+from creeping.field.validity_range import is_reached, validity
 from creeping.field.waves.beams import seconds as beam_seconds
 from creeping.field.waves.far_geometry import fan_strips
 from creeping.field.waves.surface import scalar_boundary
@@ -381,11 +382,13 @@ def by_equation_alone(
 ) -> bool:
     """Whether far fields of so many incidences are those of the equation, and rays are needed for none of them.
 
-    Of a body without expansions, at wavenumbers (k,), 1/L, at each of which the equation is solved by itself.
+    At wavenumbers (k,), 1/L, at each of which the equation is solved by itself, of a body without expansions or one
+    whose expansions reach to none of them.
     """
     if order != 2 or method not in ("auto", "currents", "equation") or speed_of(body) is not None:
         return False
-    if any(has_expansions(body, boundary) for boundary in boundaries):
+    expanded = any(has_expansions(body, boundary) for boundary in boundaries) and method != "equation"
+    if expanded and (method == "currents" or is_rough(body) or any(is_reached(body, float(k)) for k in wavenumbers)):
         return False
     plans = [plan_of(body, float(k), b, incidences=incidences) for k in wavenumbers for b in boundaries]
     # what is asked for is fine tiles for each, which all together may not have

@@ -25,6 +25,7 @@ from creeping.shadow.status import FAILED
 from creeping.sweeping.results import MISSING, count_attributes, require
 from creeping.sweeping.run import Progress, sweep_directions
 from creeping.sweeping.store import SweepStore
+from creeping.sweeping.sweeper import NoFlow
 
 if TYPE_CHECKING:
     import xarray
@@ -138,7 +139,7 @@ def sizes_of(
     """
     count, all_k, method = len(incidences), len(wavenumbers), asked["method"]
     body = getattr(flow, "body", flow)
-    if why_no_rays(body) or is_piecewise(body) or method == "t-matrix":
+    if isinstance(flow, NoFlow) or why_no_rays(body) or is_piecewise(body) or method == "t-matrix":
         return 1, count
     if method == "auto":
         ends = np.unique(wavenumbers[[0, -1]])
