@@ -31,9 +31,10 @@ from creeping.storage.parts import Arrays, Keeping, not_kept
 
 TOGETHER = 5e8
 """Bytes of what GMRES keeps of right sides that are solved together."""
-DENSE, SHARE = 4e9, 0.7
+DENSE, SHARE, HELD = 4e9, 0.7, 0.125
 """Bytes of a scalar matrix that is kept at most: beyond, a product of one column takes longer than its sums; and share
-of the memory's budget, up to which the matrix of a conductor is sooner."""
+of the memory's budget, up to which the matrix of a conductor is sooner, and up to which it stays for incidences to
+come: half as large a share of what is free."""
 
 TOLERANCE, COARSE_TOLERANCE, STEPS = 3e-5, 3e-3, 80
 """Residual of the equation relative to its right side, and most steps. Coarse tiles err by 0.03 % of the largest
@@ -102,13 +103,14 @@ def solved_columns(
     parts = len(mirrors.images)
     many = max(1, min(columns, int(parts * TOGETHER / (8 * n * (steps + 1)))))
     values, change, left = np.empty_like(right), np.empty_like(right), np.empty(columns)
-    products: list[Callable[[Any], Any]] = []
-    taken = 0
+    products, taken = list(matrix.products), 0
 
     def solved(at: slice) -> Arrays:
         if not products:
             blocks = blocks_of(matrix, mirrors) if dense else ()
             products.extend([partial(_times, block) for block in blocks] or [SplitProduct(matrix)])
+            if dense and matrix_bytes(nodes, matrix.boundary, parts) <= HELD * budget():
+                matrix.products = list(products)
         if at.start:
             tell(f"right side {at.start} of {columns}")
         rest = mirrors.shares(right[:, at])

@@ -32,6 +32,7 @@ is known beforehand as well: of B rho^nu they lack about C = lacks B w^(2 nu), w
 Sources: [WY94], [SS86]; [M72]; Derivations, F32 and F36.
 """
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import NamedTuple
 
@@ -245,6 +246,8 @@ class Matrix:
         Points inside the body at which currents are judged, once they are known.
     many : bool
         Whether many incidences are to be judged.
+    products : list of callable
+        Blocks of it times columns, once they are made, of a matrix that is small enough to be kept.
     """
 
     def __init__(self, tiles: Tiles, wavenumber: float, boundary: Boundary) -> None:
@@ -258,6 +261,7 @@ class Matrix:
         self.columns = 2 if self.vector else 1
         self.inside: FloatArray | None = None
         self.many = False
+        self.products: list[Callable[[Any], Any]] = []
         self._kept: dict[tuple[str, int], np.ndarray] = {}
 
     @cached_property

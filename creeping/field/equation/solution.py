@@ -23,7 +23,6 @@ from creeping.field.equation.columns import solved_columns
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents, charges, twice_incident
 from creeping.field.equation.effort import FULL, Effort
 from creeping.field.equation.matrix import Matrix
-from creeping.field.equation.tiles import Tiles
 from creeping.field.results.conductor_result import ConductorCurrent, ConductorField, vector_near, vector_on_body
 from creeping.field.results.far_result import FarField, incident_mix, spherical_frame
 from creeping.field.results.point_result import (
@@ -82,16 +81,15 @@ class Solution:
         wavenumber: float,
         boundary: BoundaryLike,
         kind: Boundary,
-        tiles: Tiles,
+        matrix: Matrix,
         tell: Callable[[str], None],
         effort: Effort = FULL,
         keep: Keeping = not_kept,
     ) -> None:
         self.body, self.directions, self.wavenumber, self.boundary = body, directions, wavenumber, boundary
-        self._kind, self._matrix = kind, Matrix(tiles, wavenumber, kind)
-        self.nodes, self.effort = len(tiles.points), effort
-        matrix = self._matrix
-        matrix.many = len(directions) > 1
+        self._kind, self._matrix = kind, matrix
+        self.nodes, self.effort = len(matrix.root), effort
+        matrix.many |= len(directions) > 1
         magnetic = np.swapaxes(np.cross(directions[:, None], spherical_frame(directions)), 1, 2)
         right, under = (
             twice_incident(kind, places, directions, wavenumber, magnetic) for places in (matrix.nodes, matrix.inner)

@@ -28,11 +28,12 @@ from creeping.field.boundary import BoundaryLike
 from creeping.field.equation.body_tiles import body_tiles
 from creeping.field.equation.currents import ConductorTileCurrents, TileCurrents
 from creeping.field.equation.effort import ASKED, SECONDS, Effort, equation_boundary, plan_of
+from creeping.field.equation.matrix import Matrix
 from creeping.field.equation.solution import Solution
 from creeping.geodesics.equations import points_of_charts
 from creeping.geometry.directions import unit_directions
 from creeping.geometry.piecewise import is_piecewise
-from creeping.geometry.surface import Surface, memo
+from creeping.geometry.surface import Surface, memo, memo_of
 from creeping.storage.parts import Keeping, not_kept
 
 KEPT = 6
@@ -119,8 +120,13 @@ def _solved(
     keep: Keeping = not_kept,
 ) -> Solution:
     kind = equation_boundary(boundary)
-    tiles = body_tiles(body, wavenumber, kind, coarse=effort.coarse)
-    return Solution(body, directions, wavenumber, boundary, kind, tiles, tell, effort, keep)
+
+    def make() -> Matrix:
+        return Matrix(body_tiles(body, wavenumber, kind, coarse=effort.coarse), wavenumber, kind)
+
+    # incidences one by one come with the same matrix
+    matrix = memo_of(body, "matrix of the equation", (wavenumber, boundary, effort.coarse), make, 1)
+    return Solution(body, directions, wavenumber, boundary, kind, matrix, tell, effort, keep)
 
 
 class Solved(NamedTuple):

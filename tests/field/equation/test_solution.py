@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 import creeping as cr
 import scatterers as sc
 from creeping.errors import InvalidInputError, SurfaceError
-from creeping.field.equation import effort, solving
+from creeping.field.equation import columns, effort, solving
 from creeping.field.equation.currents import TileCurrents
 from creeping.field.equation.effort import Effort, plan_of
 from tests.reference import sphere
@@ -214,3 +214,19 @@ def test_what_cannot_be_solved_is_told(flat, monkeypatch):
     assert solving.solution_for(CYLINDER, D[0], 2.9, "hard") is None
     monkeypatch.undo()
     assert plan_of(CYLINDER, 20.0, "pec").seconds > plan_of(CYLINDER, 20.0, "soft").seconds
+
+
+def test_the_matrix_stays_for_incidences_to_come(monkeypatch):
+    """A second incidence makes none, and comes out as on a body of its own."""
+    made = []
+    blocks_of = columns.blocks_of
+    monkeypatch.setattr(columns, "blocks_of", lambda *given: made.append(1) or blocks_of(*given))
+    bodies = [sc.Ellipsoid(1.0, 0.8, 0.6) for _ in range(2)]
+    first, second, alone = (
+        cr.solve(body, d, wavenumber=3.0, boundary="hard").far_field([(0.3, -1, 0.4)]).total
+        for body, d in zip([bodies[0], bodies[0], bodies[1]], [(1, 0, 0), (0, 0.6, 0.8), (0, 0.6, 0.8)], strict=True)
+    )
+    assert len(made) == 2 and second == alone and second != first
+    # another wavenumber is another matrix
+    cr.solve(bodies[0], (1, 0, 0), wavenumber=3.1, boundary="hard")
+    assert len(made) == 3
