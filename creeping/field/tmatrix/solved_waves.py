@@ -62,7 +62,7 @@ class SolvedWaves:
     ) -> None:
         self._of, self._center, self._order, self._mirrors, self._keep = matrix, center, order, mirrors, keep
         self._sums, which = parities(order, self._mirrors.flips, vector=matrix.vector)
-        c, part, signs, images = matrix.columns, self._mirrors.part, self._mirrors.signs, self._mirrors.images
+        c, part, images = matrix.columns, self._mirrors.part, self._mirrors.images
         self._above, under = matrix.beneath(part)
         own, beneath = self._waves_at(matrix.nodes.part(part)), self._waves_at(matrix.inner.part(under))
         # of nodes that are their own images the share that they have of their weight
@@ -71,18 +71,18 @@ class SolvedWaves:
         (right, sent), (self._size, size) = zip(*(_scaled(lane) for lane in own), strict=True)
         given = right, _cleared(beneath.right / self._size)
         T = np.zeros((len(size), len(size)), dtype=complex)
-        self._values: Any = np.empty((c * len(matrix.root), len(size)), dtype=np.complex64)
-        rows = (c * images[:, :, None] + np.arange(c)).reshape(len(images), -1)
-        parts = [np.flatnonzero(which == number) for number in range(len(images))]
-        # columns of values stand by parity
-        self._columns, first = np.concatenate(parts), 0
-        for number, found in enumerate(self._factorised(given, parts, tell) if direct else self._iterated(given, tell)):
-            at, chi = parts[number], self._mirrors.characters[number]
-            T[np.ix_(at, at)] = len(chi) * size[at][:, None] * (sent[:, at].T @ found) * self._size[at]
-            for image, sign in zip(rows, chi[:, None] * signs.reshape(len(chi), -1), strict=True):
-                self._values[image, first : first + len(at)] = found * sign[:, None].astype(np.float32)
-            first += len(at)
-        self.T: ComplexArray = np.asarray(self._sums @ (self._sums @ T.T).T)
+        self._parts = [np.flatnonzero(which == number) for number in range(len(images))]
+        self._found, sums = list[np.ndarray](), self._sums.tocsc()
+        for at, found in zip(
+            self._parts, self._factorised(given, tell) if direct else self._iterated(given, tell), strict=True
+        ):
+            block = len(images) * size[at][:, None] * (sent[:, at].T @ found) * self._size[at]
+            # spherical waves of few orders have a share in waves of one parity
+            few = np.unique(sums[:, at].nonzero()[0])
+            share = sums[:, at].tocsr()[few]
+            T[np.ix_(few, few)] += share @ (share @ block.T).T
+            self._found.append(found)
+        self.T: ComplexArray = T
 
     def _waves_at(self, places: Places) -> WavesAt:
         matrix, k, x = self._of, self._of.k, places.points - self._center
@@ -105,13 +105,11 @@ class SolvedWaves:
             sent += 1j * k * eta[:, None] * values.conj()
         return WavesAt(2 * values, 1j * k * sent)
 
-    def _factorised(
-        self, given: tuple[np.ndarray, np.ndarray], parts: list[Any], tell: Callable[[str], None]
-    ) -> Iterator[np.ndarray]:
+    def _factorised(self, given: tuple[np.ndarray, np.ndarray], tell: Callable[[str], None]) -> Iterator[np.ndarray]:
         """Values at the nodes of the part (c m, waves) for the waves of each parity, by LAPACK."""
         from scipy.linalg import lu_factor, lu_solve
 
-        c = self._of.columns
+        c, parts = self._of.columns, self._parts
         root = np.repeat(self._root, c).astype(np.float32)[:, None]
         B = given[0] * root
         above = (c * self._above[:, None] + np.arange(c)).ravel()
@@ -153,27 +151,33 @@ class SolvedWaves:
         matrix, k = self._of, self._of.k
         table = regular(points - self._center, k, self._order + 1)
         x, z = (np.broadcast_to(row, points.shape) for row in np.eye(3)[[0, 2]])
+        columns = np.concatenate(self._parts)
         if not matrix.vector:
             kind, factor = ("single", -0.5) if matrix.soft else ("double", 0.5)
-            left = (
-                factor
-                * matrix.received(Places.at(points, z), np.asarray(self._values), kind)
-                * self._size[self._columns]
-            )
-            left += (self._sums.T @ table[:, : count(self._order)].T).T[:, self._columns]
+            left = factor * self._received(Places.at(points, z), kind) * self._size[columns]
+            left += (self._sums.T @ table[:, : count(self._order)].T).T[:, columns]
             return float(np.sqrt(4 * np.pi * np.sum(np.abs(left) ** 2) / len(points)))
         # (n x H) x n has no part along n: another n for that one
-        H = np.empty((len(points), 3, self._values.shape[1]), dtype=complex)
-        both: Any = self._values.reshape(len(matrix.root), 2, -1)
+        H = np.empty((len(points), 3, len(columns)), dtype=complex)
         for normals, axes in ((z, [0, 1]), (x, [2])):
             places = Places.at(points, normals)
-            found = 0.5 * matrix.received(places, both)
+            found = 0.5 * self._received(places, "double").reshape(len(points), 2, -1)
             turned = places.a[:, :, None] * found[:, :1] + places.b[:, :, None] * found[:, 1:]
             H[:, axes] = np.cross(turned, normals[:, :, None], axis=1)[:, axes]
-        H *= self._size[self._columns]
+        H *= self._size[columns]
         E = np.stack([(part.T @ table.T).T for part in (p @ self._sums for p in vector_parts(self._order))], axis=1)
-        H += -1j * E.reshape(len(points), 3, -1, 2)[..., ::-1].reshape(E.shape)[..., self._columns]
+        H += -1j * E.reshape(len(points), 3, -1, 2)[..., ::-1].reshape(E.shape)[..., columns]
         return float(np.sqrt(2 * np.pi * np.sum(np.abs(H) ** 2) / len(points)))
+
+    def _received(self, places: Places, kind: str) -> ComplexArray:
+        """What places (m,) receive of the solutions, as of `Matrix.received`, parity by parity: (c m, waves)."""
+        matrix, mirrors, c = self._of, self._mirrors, self._of.columns
+        rows = matrix.rows(places, np.ones(len(places.points)), kind) * np.repeat(matrix.root, c).astype(np.float32)
+        rows = rows[:, (c * mirrors.images[:, :, None] + np.arange(c)).reshape(len(mirrors.images), -1)]
+        # nodes that are their own images count once
+        signs = (mirrors.signs / mirrors.times[:, None]).reshape(len(mirrors.images), -1)
+        of_parity = np.einsum("xg,gi,mgi->xmi", mirrors.characters, signs, rows, optimize=True)
+        return np.concatenate([mine @ found for mine, found in zip(of_parity, self._found, strict=True)], axis=1)
 
 
 def _scaled(lane: ComplexArray) -> tuple[np.ndarray, FloatArray]:

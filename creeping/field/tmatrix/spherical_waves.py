@@ -198,7 +198,8 @@ def vector_parts(order: int) -> tuple[Any, Any, Any]:
 
 def combined(table: ComplexArray, parts: Sequence[Any], vectors: FloatArray) -> ComplexArray:
     """sum_c v_c (table @ part_c) of waves (n, s), sparse parts (s, t) and vectors (n, 3): (n, t)."""
-    rows = table.T
+    # sparse products copy what does not lie in rows, each time
+    rows = np.ascontiguousarray(table.T)
     out = np.zeros((parts[0].shape[1], len(table)), dtype=complex)
     for part, v in zip(parts, vectors.T, strict=True):
         out += (part.T @ rows) * v
