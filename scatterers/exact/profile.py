@@ -371,8 +371,8 @@ def _fitted(points: FloatArray, poles: tuple[bool, bool]) -> tuple[FloatArray, F
     elif poles[1]:
         t_all, x = np.concatenate([t, 2 * length - t[-2::-1]]), np.concatenate([points, points[-2::-1] * mirror])
     degree = min(DEGREE, len(t_all) - 1)
-    # even degrees have their knots between the points
-    degree -= degree % 2 == 0
+    # even degrees have their knots between the points, but for three points, whose parabola has none
+    degree -= degree == 4
     spline = make_interp_spline(t_all, x, degree, bc_type=kind)
     columns = [PPoly.from_spline((spline.t, spline.c[:, k], degree)) for k in range(2)]
     edges, powers = columns[0].x, np.stack([column.c for column in columns], axis=-1)

@@ -8,8 +8,9 @@ from tolerances import ORDER
 
 import creeping as cr
 import scatterers as sc
+from creeping.geometry.covering import patches_of
 from creeping.geometry.surface import PiecewiseSurface, project
-from scatterers.exact.profile import Arc, Line, upward
+from scatterers.exact.profile import Arc, Line, SplineSegment, upward
 
 ALPHA = np.radians(25.0)
 BULLET = [(0, 1), (2, 1), (2, 1), (3, 0.75), (3.6, 0.4), (4, 0.0)]
@@ -255,6 +256,17 @@ def test_direction_of_the_profile_does_not_matter_and_bounds_hold_bulges_between
     # the widest place lies between two points
     bulge = sc.Revolution(np.stack([z, 2 - z**2], axis=-1))
     np.testing.assert_allclose(bulge.bounds, [[-2, -2, -1], [2, 2, 1]], atol=1e-6)
+
+
+def test_three_points_make_a_smooth_piece():
+    """A straight line between them would be a kink that is no crease: there the equation had no mesh."""
+    segment = SplineSegment(np.array([(0.0, 1.0), (1.0, 0.75), (2.0, 0.0)]), (False, False))
+    u = np.linspace(0, 1, 201)
+    heading = np.arctan2(*segment.tangent(u).T[::-1])
+    assert np.max(np.abs(np.diff(heading))) < 0.01
+    np.testing.assert_allclose(segment.point(segment.turns), [(0, 1), (2, 0)], atol=1e-14)
+    body = sc.Revolution([(0, 1), (2, 1), (2, 1), (3, 0.75), (4, 0.0)])
+    assert patches_of(body).off.max() < 1e-4
 
 
 def test_fingerprints_tell_bodies_apart():
