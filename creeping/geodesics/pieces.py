@@ -151,9 +151,10 @@ class Walk:
         self.states = np.array(states, dtype=float)
         self.lanes, n = states.shape[1], len(states)
         self.on = piece_ahead(body, states[:, X], states[:, P])
-        self.end = np.full(n, np.inf)
+        # what begins nowhere has ended
+        self.stuck = ~np.all(np.isfinite(self.states[:, :BARE]), axis=1)
+        self.end = np.where(self.stuck, 0.0, np.inf)
         self.crease = np.full(n, -1, dtype=np.int64)
-        self.stuck = np.zeros(n, dtype=bool)
         self.begin = np.zeros(n) if begin is None else begin
         self.passed: list[tuple[IntArray, FloatArray, IntArray]] = []
         # within a window: time, last stop, longest step and crossings of each ray

@@ -149,3 +149,13 @@ def test_maps_are_refused_and_the_choice_is_direct():
     with pytest.raises(InvalidInputError, match="DirectFlow"):
         cr.trace(body, (0, 0, -1), (1, 0, 0), 1.0)
     assert isinstance(cr.choose_flow(body, n_rays=10, length=1.0, tolerance=1e-6, cache=False), cr.DirectFlow)
+
+
+def test_a_ray_that_begins_nowhere_is_no_ray_and_stops_none():
+    """Newton finds no line next to some tips: NaN in one state was an IndexError of all."""
+    x, p = np.array([[0.5, 0.0, 0.2], [np.nan] * 3, [0.0, 0.5, -0.3]]), np.tile([0.0, 0.0, 1.0], (3, 1))
+    times = np.linspace(0.0, 1.0, 9)
+    found = trace_pieces(CAPSULE, pack(x, p), times, rtol=1e-10, beyond=0.5)
+    alone = trace_pieces(CAPSULE, pack(x[[0, 2]], p[[0, 2]]), times, rtol=1e-10, beyond=0.5)
+    assert found.end[1] == 0 and found.crease[1] == -1 and np.all(np.isnan(found.states[1, :, X]))
+    np.testing.assert_allclose(found.states[[0, 2]], alone.states, atol=1e-12)
