@@ -45,7 +45,18 @@ WIDE, NARROW = 16, 8
 
 
 def drawer(name: str) -> Callable[[Path, bool], dict[str, Any]]:
-    """Function that draws a figure."""
+    """Function that draws a figure.
+
+    Raises
+    ------
+    InvalidInputError
+        If there is no such figure.
+    """
+    from creeping.errors import InvalidInputError, near_names
+
+    known = f"figures are {', '.join(FIGURES)}"
+    if name not in FIGURES:
+        raise InvalidInputError(f"unknown figure {name!r}{near_names(name, FIGURES) or f'; {known}'}")
     module, function = FIGURES[name].split(".")
     found: Callable[[Path, bool], dict[str, Any]] = getattr(import_module(f"studies.figures.{module}"), function)
     return found
@@ -89,14 +100,11 @@ def draw(name: str, folder: str | Path, *, quick: bool = False) -> dict[str, Any
     from creeping.files import write_text
     from creeping.storage.atomic import written_aside
 
-    if name not in FIGURES:
-        raise InvalidInputError(f"unknown figure {name!r}; figures are {', '.join(FIGURES)}")
-    folder = Path(folder)
+    folder, function = Path(folder), drawer(name)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InvalidInputError(f"cannot make the folder {folder}: {error}; choose another") from error
-    function = drawer(name)
     target = folder / f"{name}.png"
     started = time.perf_counter()
     with written_aside(target) as aside:

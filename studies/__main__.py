@@ -9,6 +9,7 @@ import difflib
 import runpy
 import sys
 from pathlib import Path
+from unittest.mock import patch
 
 from studies import FIGURES
 
@@ -26,8 +27,7 @@ def listing() -> str:
     """Name and title of each study, a line each; nothing is imported."""
     lines = []
     for name, path in sources().items():
-        at = path.with_name("__init__.py") if path.stem == "__main__" else path
-        told: ast.AST = ast.parse(at.read_text(encoding="utf-8"))
+        told: ast.AST = ast.parse(path.read_text(encoding="utf-8"))
         if name in FIGURES:
             function = FIGURES[name].split(".")[1]
             told = next(node for node in ast.walk(told) if getattr(node, "name", "") == function)
@@ -53,12 +53,8 @@ def main(arguments: list[str] | None = None) -> None:
         print(f"studies: there is no study {name!r}; {meant}", file=sys.stderr)
         raise SystemExit(2)
     module = ".".join(known[name].relative_to(HERE.parent).with_suffix("").parts)
-    before = sys.argv
-    sys.argv = [f"python -m studies {name}", *options]
-    try:
+    with patch.object(sys, "argv", [f"python -m studies {name}", *options]):
         runpy.run_module(module, run_name="__main__", alter_sys=True)
-    finally:
-        sys.argv = before
 
 
 if __name__ == "__main__":

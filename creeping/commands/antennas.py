@@ -9,8 +9,10 @@ import json
 import re
 import sys
 import time
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -19,6 +21,7 @@ from cyclopts import Parameter
 from creeping._progress import Progress
 from creeping.commands import options
 from creeping.commands.options import parse_body, title_of
+from creeping.errors import InvalidInputError
 
 Port = Annotated[
     list[str],
@@ -44,10 +47,7 @@ Size = Annotated[
         "Of points: the distance at which a source on a plane has the transfer ratio 1.",
     ),
 ]
-Folder = Annotated[Path, Parameter(name=["-o", "--output"], group=options.OUTPUT, help="Folder for the results.")]
 
-MOST = 100_000
-"""Pairs of ports times frequencies."""
 _VECTOR = r"([^,/=]+),([^,/=]+),([^,/=]+)"
 
 
@@ -69,14 +69,13 @@ def coupling(
     wave: options.WaveOptions = options.NO_WAVE,
     file: options.FileOptions = options.AS_IT_IS,
     size: Size = None,
-    output: Folder = Path("out"),
+    output: options.Folder = Path("out"),
     pictures: options.Pictures = True,
     json_: options.Json = False,
 ) -> int:
     """Coupling of antennas on a body over frequency: coupling.csv, paths.csv of the geodesics, and a picture."""
     import numpy as np
 
-    from creeping.errors import InvalidInputError
     from creeping.field.ports.coupling_result import Coupling
 
     started = time.perf_counter()
@@ -88,8 +87,8 @@ def coupling(
         raise InvalidInputError("--size makes a Touchstone file, which has one kind of ports: slots or monopoles")
     if size is not None and hertz is None:
         raise InvalidInputError("--size makes a Touchstone file, which is over frequency: give --frequency")
-    if len(k) * len(ports.names) ** 2 > MOST:
-        raise InvalidInputError(f"{len(ports.names)} ports at {len(k)} frequencies: {MOST} pairs in all are the most")
+    if len(k) * len(ports.names) ** 2 > 100_000:
+        raise InvalidInputError(f"{len(ports.names)} ports at {len(k)} frequencies: 100000 pairs in all are the most")
     with Progress("frequencies") as progress:
         shape = parse_body(body, options=file, progress=progress.message)
         placed, moved = _on_body(shape, ports)
@@ -110,10 +109,9 @@ def coupling(
     elif pictures:
         _draw(output / "coupling.png", ports, found, hertz, title_of(body))
         files.append("coupling.png")
-    states: dict[str, int] = {}
-    for one in found:
-        for name, count in one.status_counts.items():
-            states[name] = states.get(name, 0) + count - (len(ports.names) if name == "CAUSTIC" else 0)
+    states = sum((Counter(one.status_counts) for one in found), Counter[str]())
+    # a port with itself
+    states["CAUSTIC"] -= len(found) * len(ports.names)
     summary = {
         "body": body,
         "ports": list(ports.names),
@@ -136,8 +134,6 @@ def parse_ports(texts: Sequence[str], kind: str) -> Ports:
         If a text is none of a port, two have one name, or an axis is missing or too much for the kind.
     """
     import numpy as np
-
-    from creeping.errors import InvalidInputError
 
     rows: list[tuple[str, list[float], list[float] | None]] = []
     for number, text in enumerate(texts):
@@ -185,7 +181,6 @@ def _on_body(shape: Any, ports: Ports) -> tuple[Any, str]:
     """Ports put on the body (n, 3), and what is said of those that were moved."""
     import numpy as np
 
-    from creeping.errors import InvalidInputError
     from creeping.geometry.arguments import rays_refused
     from creeping.geometry.checks import unit_of
     from creeping.geometry.surface import project, size, why_no_rays
@@ -254,20 +249,15 @@ def readable(ports: Ports, found: Sequence[Any], hertz: Any, summary: dict[str, 
     def wave(number: int) -> str:
         return f"k = {found[number].wavenumber:g}" if hertz is None else frequency_words(float(hertz[number]))
 
-    ends = [0] if len(found) == 1 else [0, len(found) - 1]
+    ends = dict.fromkeys((0, len(found) - 1))
     lines = []
-    for i in range(len(ports.names)):
-        for j in range(i + 1, len(ports.names)):
-            levels = ", ".join(f"{_level(found[n], i, j)} at {wave(n)}" for n in ends)
-            lines.append(f"{ports.names[i]} to {ports.names[j]}: {levels}")
+    for i, j in combinations(range(len(ports.names)), 2):
+        levels = ", ".join(f"{_level(found[n], i, j)} at {wave(n)}" for n in ends)
+        lines.append(f"{ports.names[i]} to {ports.names[j]}: {levels}")
     states = ", ".join(f"{count} {name}" for name, count in summary["status"].items())
-    return "\n".join(
-        [
-            *lines,
-            f"decibels re {found[0].unit}, of unit moments; {states}",
-            f"{len(summary['files'])} files in {output} ({', '.join(summary['files'])}), {summary['seconds']:.1f} s",
-        ]
-    )
+    files = f"{len(summary['files'])} files in {output} ({', '.join(summary['files'])})"
+    lines.append(f"decibels re {found[0].unit}, of unit moments; {states}\n{files}, {summary['seconds']:.1f} s")
+    return "\n".join(lines)
 
 
 def _level(found: Any, i: int, j: int) -> str:

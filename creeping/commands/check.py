@@ -9,6 +9,7 @@ from cyclopts import Parameter
 
 from creeping.commands import options
 from creeping.commands.options import CAD, MESHES, is_file, parse_body
+from creeping.errors import CreepingError, InvalidInputError
 
 Output = Annotated[
     Path | None, Parameter(name=["-o", "--output"], help="Folder for quality.png, a file's mesh where it is rough.")
@@ -29,8 +30,6 @@ def check(
     With a wave also whether the field's expansions reach there, and a file's size in wavelengths. Exit code 3 if
     something is wrong.
     """
-    from creeping.errors import InvalidInputError
-
     wavenumber: float | None = None
     asked: dict[str, Any] = {}
     if wave != options.NO_WAVE:
@@ -57,7 +56,9 @@ def check(
         refusal = error
     if refusal is not None or output is not None:
         # what is known of a mesh that can be read is worth more than the refusal alone
-        _mesh(body, file, wavenumber, output, answer, texts)
+        found, told = _mesh(body, file, wavenumber, output)
+        answer |= found
+        texts += told
     if shape is None:
         ok, answer["refused"] = False, str(refusal)
         texts.append(f"refused: {refusal}")
@@ -117,7 +118,6 @@ def _range(shape: Any, wavenumber: float, answer: dict[str, Any], texts: list[st
     """Whether the field's expansions hold, on rays of evenly spread incidences."""
     from math import isfinite
 
-    from creeping.errors import CreepingError
     from creeping.field.validity_range import body_validity, validity_words
     from creeping.rays.reach import INCIDENCES
 
@@ -136,25 +136,19 @@ def _range(shape: Any, wavenumber: float, answer: dict[str, Any], texts: list[st
 
 
 def _mesh(
-    body: str,
-    file: options.FileOptions,
-    wavenumber: float | None,
-    output: Path | None,
-    answer: dict[str, Any],
-    texts: list[str],
-) -> None:
+    body: str, file: options.FileOptions, wavenumber: float | None, output: Path | None
+) -> tuple[dict[str, Any], list[str]]:
     """The quality of a mesh as it is in the file, and its picture; also of one that cannot be fitted."""
-    from creeping.errors import InvalidInputError
     from scatterers import examined_mesh
 
     try:
         mesh, quality = examined_mesh(body, **{k: v for k, v in file.given().items() if k not in ("strict", "surface")})
     except (ValueError, ModuleNotFoundError) as error:
         raise InvalidInputError(f"{body}: {error}") from error
-    answer |= {"quality": quality.to_json(), "repairs": list(mesh.repairs)}
-    texts += [*mesh.repairs, quality.summary(wavenumber)]
+    answer = {"quality": quality.to_json(), "repairs": list(mesh.repairs)}
+    texts = [*mesh.repairs, quality.summary(wavenumber)]
     if output is None:
-        return
+        return answer, texts
     from creeping.commands.resuming import make_folder
     from creeping.plotting.pictures import MeshValues, mesh_picture
 
@@ -162,4 +156,4 @@ def _mesh(
     shown = MeshValues(mesh.vertices, mesh.triangles, quality.badness, quality.bad, Path(body).name)
     mesh_picture(output / "quality.png", shown)
     answer["picture"] = str(output / "quality.png")
-    texts.append(f"picture: {output / 'quality.png'}")
+    return answer, [*texts, f"picture: {output / 'quality.png'}"]

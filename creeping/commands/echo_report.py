@@ -54,11 +54,14 @@ def run_echo(job: EchoJob, shape: Any, progress: Progress) -> str:
     unfinished = begun(output, request.quantity, asked_for(job.body, shape, **words), resume=given.resume)
     if unfinished is None:
         return (output / SUMMARY).read_text() if given.json_ else f"nothing is missing in {output}"
+    frequencies = f"{len(k)} frequenc{'ies' if len(k) > 1 else 'y'} by {told.by}"
     with kept(unfinished, progress.message):
         if angles is None:
-            summary = _averages(job, shape, unfinished, progress, told.by)
+            progress(f"the mean over all orientations at {frequencies}")
+            summary = _averages(job, shape, unfinished, progress)
         else:
-            summary = _echo(job, shape, angles, unfinished, progress, told.by)
+            progress(f"{len(angles[0])} angle{'s' * (len(angles[0]) > 1)} x {frequencies}")
+            summary = _echo(job, shape, angles, unfinished, progress)
         summary["files"].append(SUMMARY)
         unfinished.write_summary(summary, complete=True)
     summary |= {"complete": True, "seconds": round(time.perf_counter() - job.started, 2)}
@@ -66,21 +69,11 @@ def run_echo(job: EchoJob, shape: Any, progress: Progress) -> str:
     return json.dumps(summary, indent=1) if given.json_ else say(summary, output)
 
 
-def _echo(
-    job: EchoJob,
-    shape: Any,
-    angles: tuple[FloatArray, FloatArray],
-    unfinished: Unfinished,
-    progress: Progress,
-    by: str,
-) -> dict[str, Any]:
-    """Compute and write an echo; returns the summary."""
+def _echo(job: EchoJob, shape: Any, angles: Any, unfinished: Unfinished, progress: Progress) -> dict[str, Any]:
+    """Compute and write an echo at azimuths and elevations (n,), degrees; returns the summary."""
     request, given, k = job.request, job.given, job.request.wavenumbers
     output, quantity, method = unfinished.output, request.quantity, given.method
-    count = len(angles[0])
-    values = count * len(k)
-    frequencies = f"{len(k)} frequenc{'ies' if len(k) > 1 else 'y'}"
-    progress(f"{count} angle{'s' * (count > 1)} x {frequencies} by {by}")
+    values = len(angles[0]) * len(k)
     progress.begin(0, values)
 
     def echo_for(dataset: Any) -> Echo:
@@ -104,9 +97,8 @@ def _echo(
         dataset = backscatter(shape, method=method, **asked)
     else:
         # one fan for all observers: currents cost no more than rays
-        dataset = bistatic(
-            shape, incidence=request.incidence, method="currents" if method == "auto" else method, **asked
-        )
+        method = "currents" if method == "auto" else method
+        dataset = bistatic(shape, incidence=request.incidence, method=method, **asked)
     echo = echo_for(dataset)
     progress("tables and pictures" if given.pictures else "tables")
     comparisons, refused = compared(echo, job.reference, given.align)
@@ -146,8 +138,7 @@ def write_results(
     formats: tuple[str, ...] = ("csv",),
 ) -> tuple[list[str], dict[str, Any]]:
     """Write tables and pictures; their names, and what they add to the summary."""
-    stem = echo.quantity
-    names = [f"{stem}.{kind}" for kind in formats]
+    names = [f"{echo.quantity}.{kind}" for kind in formats]
     for file in names:
         write = write_mat if file.endswith(".mat") else write_echo
         write(output / file, echo)
@@ -161,7 +152,7 @@ def write_results(
         extra["range_resolution"] = next(iter(profiles.values())).resolution
         extra["range_repeats"] = float(np.pi / np.diff(echo.wavenumbers).mean())
     if pictures:
-        names += _drawn(output, stem, echo, profiles, _ranges(echo, body), name)
+        names += _drawn(output, echo, profiles, body, name)
         if comparisons:
             plotting.comparison_picture(output / "compared.png", echo, comparisons, title=_title(echo, name))
             names.append("compared.png")
@@ -190,26 +181,21 @@ def _profiles(echo: Echo) -> dict[str, RangeProfile]:
         return {}
 
 
-def _drawn(
-    output: Path, stem: str, echo: Echo, profiles: dict[str, RangeProfile], span: tuple[float, float], name: str
-) -> list[str]:
-    words: dict[str, Any] = {"title": _title(echo, name)}
-    several, band = len(echo.azimuth) > 1, len(echo.wavenumbers) > 1
-    jobs: dict[str, Callable[[Path], None]] = {}
-    if several and band:
-        jobs[f"{stem}_map.png"] = lambda path: plotting.echo_picture(path, echo, **words)
-    elif several or band:
-        jobs[f"{stem}.png"] = lambda path: plotting.echo_picture(path, echo, **words)
-    if several and not band:
-        jobs[f"{stem}_polar.png"] = lambda path: plotting.echo_picture(path, echo, kind="polar", **words)
-    if profiles:
-        jobs["range.png"] = lambda path: plotting.range_picture(path, profiles, echo, span, **words)
-    names = []
-    for file, draw in jobs.items():
+def _drawn(output: Path, echo: Echo, profiles: dict[str, RangeProfile], body: Surface, name: str) -> list[str]:
+    several, band, names = len(echo.azimuth) > 1, len(echo.wavenumbers) > 1, list[str]()
+
+    def drawn(file: str, draw: Callable[..., None], *what: Any, **options: Any) -> None:
         # what cannot be drawn in decibels the table says
         with suppress(InvalidInputError):
-            draw(output / file)
+            draw(output / file, *what, title=_title(echo, name), **options)
             names.append(file)
+
+    if several or band:
+        drawn(f"{echo.quantity}{'_map' if several and band else ''}.png", plotting.echo_picture, echo)
+    if several and not band:
+        drawn(f"{echo.quantity}_polar.png", plotting.echo_picture, echo, kind="polar")
+    if profiles:
+        drawn("range.png", plotting.range_picture, profiles, echo, _ranges(echo, body))
     return names
 
 
@@ -251,10 +237,8 @@ def summary_of(body: str, request: EchoRequest, echo: Echo, dataset: Any) -> dic
 def readable(summary: dict[str, Any], output: Path) -> str:
     """The summary as a person reads it."""
     unit = summary["unit"]
-    tops = ", ".join(
-        f"{channel} up to {value:.2f}" if value is not None else f"{channel} nothing finite"
-        for channel, value in summary["largest"].items()
-    )
+    largest = summary["largest"].items()
+    tops = ", ".join(f"{name} " + ("nothing finite" if top is None else f"up to {top:.2f}") for name, top in largest)
     rows = [f"{summary['quantity']} of {summary['body']}, {boundary_words(summary['boundary'])}, {unit}: {tops}"]
     if summary["error_db_median"] is not None:
         rows.append(
@@ -299,12 +283,11 @@ def readable(summary: dict[str, Any], output: Path) -> str:
     return "\n".join(rows)
 
 
-def _averages(job: EchoJob, shape: Any, unfinished: Unfinished, progress: Progress, by: str) -> dict[str, Any]:
+def _averages(job: EchoJob, shape: Any, unfinished: Unfinished, progress: Progress) -> dict[str, Any]:
     """Compute and write means over orientation; returns the summary."""
     request, given, k = job.request, job.given, job.request.wavenumbers
     output, quantity, boundary = unfinished.output, request.quantity, parse_boundary(request.boundary)
     hertz = np.array([float(f"{one:.14g}") for one in np.atleast_1d(frequency(k, sound_speed=request.sound_speed))])
-    progress(f"the mean over all orientations at {len(k)} frequenc{'ies' if len(k) > 1 else 'y'} by {by}")
     progress.begin(0, len(k))
     table, rows = output / f"{quantity}_average.csv", list[tuple[float, Averages]]()
 

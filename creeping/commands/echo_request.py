@@ -22,8 +22,6 @@ from creeping.files.measured import MeasuredCut, read_cut
 from creeping.geometry.surface import Surface
 
 AXES = {"az": "azimuth", "el": "elevation"}
-MOST = 200_000
-"""Angles of a cut."""
 FORMS = "az or el for a cut, az:FIRST:LAST:STEP for a part of one, az:20 or az:20,el:5 for one direction"
 
 
@@ -80,9 +78,9 @@ class EchoRequest:
 
         step = self.step or lobe_step(body, float(self.wavenumbers.max()), monostatic=self.monostatic)
         count = (self.span[1] - self.span[0]) / step
-        if count > MOST:
+        if count > 200_000:
             raise InvalidInputError(
-                f"a cut of {count:.3g} angles is asked for; {MOST} are the most: give a coarser step, if the body is "
+                f"a cut of {count:.3g} angles is asked for; 200000 are the most: give a coarser step, if the body is "
                 f"to be {size_words(body, self.wavenumbers, metres=True, cure=self.cure)}"
             )
         varied = np.asarray(self.span[0] + step * np.arange(int(count + 1e-9) + 1), dtype=float)
@@ -90,31 +88,21 @@ class EchoRequest:
         return (varied, fixed) if self.angle_name == "azimuth" else (fixed, varied)
 
 
-def echo_request(
-    quantity: str,
-    *,
-    frequency: str | None,
-    wavelength: str | None,
-    sound_speed: float | None,
-    polarisation: str | None,
-    boundary: str,
-    monostatic: str | None,
-    bistatic: str | None,
-    incidence: str | None,
-) -> EchoRequest:
-    """What the options ask for.
+def echo_request(quantity: str, **asked: Any) -> EchoRequest:
+    """What the options ask for, those of the wave and of angles, each by its name.
 
     Raises
     ------
     InvalidInputError
         Names the option that is wrong.
     """
+    frequency, wavelength, sound_speed = (asked[name] for name in ("frequency", "wavelength", "sound_speed"))
+    monostatic, bistatic, incidence = (asked[name] for name in ("monostatic", "bistatic", "incidence"))
     if (frequency is None) == (wavelength is None):
         raise InvalidInputError('give --frequency, e.g. "10GHz" or "2:18:0.1GHz", or --wavelength, e.g. "3cm"')
     if monostatic is not None and bistatic is not None:
         raise InvalidInputError("--monostatic and --bistatic are both given; give one")
     text, option = (frequency, "--frequency") if frequency is not None else (wavelength, "--wavelength")
-    assert text is not None
     try:
         if is_length(text) != (wavelength is not None):
             raise InvalidInputError(
@@ -124,33 +112,22 @@ def echo_request(
     except InvalidInputError as error:
         raise InvalidInputError(f"{option}: {error}") from error
     at = (0.0, 0.0) if incidence is None else _pair("--incidence", incidence, _numbers("--incidence", incidence, 2))
-    asked = monostatic if monostatic is not None else bistatic
-    if asked is None and len(numbers) == 1 and incidence is None:
-        asked = "az"
-    if boundary == "pec":
-        channels = each_once("--polarisation", polarisation or "HH,VV", POLARISATIONS)
-    elif polarisation is not None:
+    seen = monostatic if monostatic is not None else bistatic
+    if seen is None and len(numbers) == 1 and incidence is None:
+        seen = "az"
+    if asked["boundary"] == "pec":
+        channels = each_once("--polarisation", asked["polarisation"] or "HH,VV", POLARISATIONS)
+    elif asked["polarisation"] is not None:
         raise InvalidInputError("--polarisation is of a conductor; sound has none")
     else:
         # as datasets name it
-        channels = (boundary_name(parse_boundary(boundary)),)
+        channels = (boundary_name(parse_boundary(asked["boundary"])),)
     option_of_angles = "--bistatic" if bistatic is not None else "--monostatic"
-    place = _place(option_of_angles, asked, at)
-    name, span, step = _cut(option_of_angles, asked if place is None else None)
-    return EchoRequest(
-        quantity=quantity,
-        wavenumbers=numbers,
-        sound_speed=sound_speed,
-        channels=channels,
-        boundary=boundary,
-        monostatic=bistatic is None,
-        incidence=(at[0], at[1]),
-        place=place or at,
-        angle_name=name,
-        span=span,
-        step=step,
-        cure=cure_of(option, text, float(frequency_of(numbers.max(), sound_speed=sound_speed))),
-    )
+    place = _place(option_of_angles, seen, at)
+    varied = _cut(option_of_angles, seen if place is None else None)
+    cure = cure_of(option, text, float(frequency_of(numbers.max(), sound_speed=sound_speed)))
+    wave = numbers, sound_speed, channels, asked["boundary"]
+    return EchoRequest(quantity, *wave, bistatic is None, at, place or at, *varied, cure)
 
 
 @dataclass(frozen=True)

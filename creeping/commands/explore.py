@@ -8,6 +8,7 @@ from cyclopts import Group, Parameter
 
 from creeping.commands import options
 from creeping.commands.options import is_file, parse_body, title_of
+from creeping.errors import CreepingError, InvalidInputError
 
 _page = Group("Page")
 
@@ -41,7 +42,6 @@ def explore(
     """
     import creeping as cr
     from creeping.commands.forecast import asked_wavenumber
-    from creeping.errors import CreepingError, InvalidInputError
     from creeping.explorer.frames import step_of, steps_of
     from creeping.explorer.request import ViewRequest, angles
     from creeping.geometry.arguments import rays_refused

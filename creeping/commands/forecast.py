@@ -134,26 +134,20 @@ def forecast(
     elif not refused and not is_reached(shape, float(k.min())):
         by = f"{equation}, as parts are more curved than rays and currents allow"
     else:
-        takes = _cost(shape, k, incidences, observers, boundary)
-        by = f"creeping rays and surface currents, {takes}{_errors(shape, k)}"
+        by = "creeping rays and surface currents, "
+        if incidences is not None:
+            from creeping.sweeping.echoes import seconds_of_currents
+
+            # where currents must serve all they are hundreds of times as slow as rays
+            seconds = seconds_of_currents(shape, k, incidences, observers=observers, boundary=boundary)
+            by += f"up to about {duration(seconds)} if currents serve all, " if seconds else ""
+        by += _errors(shape, k)
         by += "" if refused else f"; where these fail, {equation}"
     return Forecast(body, by, nodes)
 
 
 def _takes(seconds: float, memory: float) -> str:
     return f"about {duration(seconds)} and {memory / 1e9:.2g} GB"
-
-
-def _cost(
-    shape: Any, k: FloatArray, radar: tuple[FloatArray, FloatArray] | None, observers: int, boundary: BoundaryLike
-) -> str:
-    """What currents may take where they must serve all, hundreds of times as slowly as rays."""
-    if radar is None:
-        return ""
-    from creeping.sweeping.echoes import seconds_of_currents
-
-    seconds = seconds_of_currents(shape, k, *radar, observers=observers, boundary=boundary)
-    return f"up to about {duration(seconds)} if currents serve all, " if seconds else ""
 
 
 def _errors(shape: Any, k: FloatArray) -> str:

@@ -22,6 +22,7 @@ from creeping.commands import options, resuming
 from creeping.commands import sweep as _sweep_command
 from creeping.commands import upkeep as _upkeep
 from creeping.commands.options import Output, each_once, flow_of, parse_body, title_of
+from creeping.errors import CreepingError, InvalidInputError
 
 app = App(
     name="creeping",
@@ -36,13 +37,10 @@ cache_app = App(name="cache", help="Stored phase maps and fitted bodies: list, v
 app.command(cache_app)
 
 _wave = Group("Incident wave", validator=validators.mutually_exclusive)
-Folder = Annotated[Path, Parameter(name=["-o", "--output"], group=options.OUTPUT, help="Folder for the results.")]
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line (of the process, unless arguments are given) and exit with its code."""
-    from creeping.errors import CreepingError
-
     given = sys.argv[1:] if arguments is None else arguments
     resuming.words[:] = given
     if sorted(given) == ["--json", "--version"]:
@@ -79,9 +77,8 @@ def _as_options(text: str) -> str:
     from dataclasses import fields
     from inspect import signature
 
-    names = {
-        field.name for kind in (options.FileOptions, options.WaveOptions, options.EchoOptions) for field in fields(kind)
-    }
+    kinds = (options.FileOptions, options.WaveOptions, options.EchoOptions)
+    names = {field.name for kind in kinds for field in fields(kind)}
     names.update(*(signature(command).parameters for command in (run, ts)))
     # k is in messages whichever of three options gave it
     words = "|".join(sorted(names - {"wavenumber", "body", "file", "wave"}, key=len, reverse=True))
@@ -106,7 +103,7 @@ def run(
     source: Annotated[
         tuple[float, float, float] | None, Parameter(help="Or where a point source is, off the body.", group=_wave)
     ] = None,
-    output: Folder,
+    output: options.Folder,
     length: Annotated[
         float | Literal["auto"],
         Parameter(help="Travel time of the rays; auto is where the wave has died away, at k rho = 10 without a field."),
@@ -193,9 +190,7 @@ def run(
             raise cr.CreepingError(f"--{name} {value!r} is not a positive finite number")
     of = of or ("travel_time" if source is None else "eikonal")
     if source is None and direction is None:
-        raise cr.InvalidInputError(
-            "give --direction X Y Z, where a plane wave travels, or --source X Y Z, a point source"
-        )
+        raise InvalidInputError("give --direction X Y Z, where a plane wave travels, or --source X Y Z, a point source")
     incident: Any = PlaneWave(direction or ()) if source is None else PointSource(source)
     job = _field_run.job(wave, boundary, observe, direction, weighted=speed is not None, polarisation=polarisation)
     with Progress(quiet=json_) as progress:
@@ -286,8 +281,6 @@ def ts(
     file: options.FileOptions = options.AS_IT_IS,
 ) -> int:
     """Target strength of a body in dB re 1 m: over angle, frequency or both, or in the mean."""
-    from creeping.errors import InvalidInputError
-
     if boundary == "pec":
         raise InvalidInputError("--boundary pec is of radar: creeping rcs")
     return _run_echo("ts", body, echo, file, sound_speed=sound_speed, polarisation=None, boundary=boundary)
@@ -319,8 +312,6 @@ def levels_of(fan: Any, step: float, of: str) -> Any:
     """
     import numpy as np
 
-    from creeping.errors import InvalidInputError
-
     values = fan.travel_time if of == "travel_time" else fan.eikonal
     low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
     first, last = int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9))
@@ -334,8 +325,6 @@ def levels_of(fan: Any, step: float, of: str) -> Any:
 def _studies() -> Any:
     """The package of studies, which lies beside this one in the repository and is not installed."""
     from importlib import import_module
-
-    from creeping.errors import InvalidInputError
 
     beside = str(Path(__file__).parents[2])
     if not (Path(beside) / "studies" / "__init__.py").is_file():
@@ -354,7 +343,7 @@ def figure(
     name: Annotated[str | None, Parameter(help="Name of the figure; see --list.")] = None,
     /,
     *,
-    output: Folder = Path("out"),
+    output: options.Folder = Path("out"),
     all_: Annotated[bool, Parameter(name="--all", negative="", help="Draw every figure.")] = False,
     list_: Annotated[bool, Parameter(name="--list", negative="", help="List the figures.")] = False,
     quick: Annotated[bool, Parameter(negative="", help="Coarser and faster.")] = False,
@@ -362,26 +351,21 @@ def figure(
 ) -> int:
     """Draw figures of the paper, each with a sidecar of its parameters, error and seconds; from a clone alone."""
     studies = _studies()
-    from creeping.errors import InvalidInputError, near_names
-
     if list_:
         print("\n".join(f"{key:16} {title}" for key, title in studies.titles().items()))
         return 0
     if all_ == (name is not None):
         raise InvalidInputError(f"give one figure or --all; figures are {', '.join(studies.FIGURES)}")
-    if name is not None and name not in studies.FIGURES:
-        near = near_names(name, studies.FIGURES) or f"; figures are {', '.join(studies.FIGURES)}"
-        raise InvalidInputError(f"unknown figure {name!r}{near}")
+    names = studies.FIGURES if name is None else [name]
+    for key in names:
+        studies.drawer(key)
     cards = []
     with Progress(quiet=json_) as progress:
-        for key in studies.FIGURES if name is None else [name]:
+        for key in names:
             progress(f"figure {key}")
             cards.append(studies.draw(key, output, quick=quick))
-    if json_:
-        print(json.dumps(cards, indent=1))
-    else:
-        for card in cards:
-            print(f"{output / card['file']}  {card['seconds']:.1f} s  {card['headline']}")
+    told = (f"{output / card['file']}  {card['seconds']:.1f} s  {card['headline']}" for card in cards)
+    print(json.dumps(cards, indent=1) if json_ else "\n".join(told))
     return 0
 
 

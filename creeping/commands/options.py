@@ -24,6 +24,7 @@ Body = Annotated[
 ]
 SpeedOption = Annotated[str | None, Parameter(help="Speed c(x, y, z) of the weighted flow, e.g. '1 + x'.")]
 OUTPUT, FIELD, ANGLES = Group("Output"), Group("Field"), Group("Angles")
+Folder = Annotated[Path, Parameter(name=["-o", "--output"], group=OUTPUT, help="Folder for the results.")]
 Json = Annotated[bool, Parameter(name="--json", negative="", group=OUTPUT, help="Print as JSON.")]
 Pictures = Annotated[bool, Parameter(group=OUTPUT, help="Draw pictures; --no-pictures leaves them out.")]
 Formats = Annotated[

@@ -70,13 +70,6 @@ class Unfinished:
         """What files say that lack rows."""
         return f"to go on: {self.again}"
 
-    def make(self) -> None:
-        """Make the folder of the parts."""
-        from creeping.files import write_text
-
-        make_folder(self.parts, self.output)
-        write_text(self.parts / ASKED, json.dumps(self.asked, indent=1) + "\n")
-
     def kept_parts(self) -> "Parts":
         """What keeps arrays by name; see `creeping.storage.parts`."""
         from creeping.storage.parts import Parts
@@ -171,7 +164,10 @@ def kept(unfinished: Unfinished, message: Callable[[str], None]) -> Iterator[Non
     def stop(*_: Any) -> None:
         raise KeyboardInterrupt
 
-    unfinished.make()
+    from creeping.files import write_text
+
+    make_folder(unfinished.parts, unfinished.output)
+    write_text(unfinished.parts / ASKED, json.dumps(unfinished.asked, indent=1) + "\n")
     main = threading.current_thread() is threading.main_thread()
     before = signal.signal(signal.SIGTERM, stop) if main else None
     try:

@@ -115,10 +115,8 @@ class Job:
 
     def told(self, unit: str) -> str:
         """Wavenumber and frequency in words."""
-        wave = f"k = {self.wavenumber:g}/{unit}"
-        if self.frequency is None:
-            return wave
-        return f"{frequency_words(self.frequency)}, {wave}"
+        hertz = "" if self.frequency is None else f"{frequency_words(self.frequency)}, "
+        return f"{hertz}k = {self.wavenumber:g}/{unit}"
 
     def far_field(
         self, fan: RayFan, unfinished: Unfinished, told: Callable[[float, int], None] = lambda *_: None
@@ -151,9 +149,9 @@ class Job:
         """Write the rows of the first directions, with marks that others are missing."""
         done, count = len(far.total), len(self.directions)
         mark = f"incomplete: {done} of {count} directions; {unfinished.mark}"
-        texts = [target.text for target in self.targets for _ in target.directions][:done]
-        angles = np.concatenate([target.angles for target in self.targets])[:done]
-        files.write_csv(unfinished.output / "far.csv", far=self._turned(far), observed=(texts, angles), mark=mark)
+        texts, angles = self._observed
+        observed = texts[:done], angles[:done]
+        files.write_csv(unfinished.output / "far.csv", far=self._turned(far), observed=observed, mark=mark)
         words = {"directions_done": done, "directions": count, "resume": unfinished.again}
         unfinished.write_summary(words, complete=False)
 
@@ -171,6 +169,12 @@ class Job:
     def directions(self) -> FloatArray:
         """Directions of all targets (m, 3), one after the other."""
         return np.concatenate([target.directions for target in self.targets])
+
+    @property
+    def _observed(self) -> tuple[list[str], FloatArray]:
+        """What each direction was asked for as, and its angle along the cut (m,), degrees."""
+        texts = [target.text for target in self.targets for _ in target.directions]
+        return texts, np.concatenate([target.angles for target in self.targets])
 
     def _turned(self, far: FarField) -> FarField:
         """A far field in the frames of the targets and the unit that was asked for."""
@@ -235,9 +239,7 @@ class Job:
         return [far.take(slice(end - len(t.directions), end)) for t, end in zip(self.targets, ends, strict=True)]
 
     def _tables(self, far: FarField, direction: FloatArray, output: Output) -> list[str]:
-        texts = [target.text for target in self.targets for _ in target.directions]
-        angles = np.concatenate([target.angles for target in self.targets])
-        names = write_tables(output.folder / "far", output.formats, far, observed=(texts, angles), far=far)
+        names = write_tables(output.folder / "far", output.formats, far, observed=self._observed, far=far)
         for target, piece in zip(self.targets, self._pieces(far), strict=True):
             # a .ffe file holds no infinity; the table does
             if target.kind == "grid" and np.all(np.isfinite(piece.total)):
@@ -247,35 +249,26 @@ class Job:
         return names
 
     def _pictures(self, far: FarField, of: RayFan | Solution, output: Output) -> list[str]:
-        names, folder = [], output.folder
-        shown: dict[str, Any] = {
-            "wave": self.told(far.unit),
-            "name": output.name,
-            "backend": output.backend,
-            "dpi": DPI,
-        }
+        names, folder = list[str](), output.folder
+        wave = self.told(far.unit)
+        shown: dict[str, Any] = {"wave": wave, "name": output.name, "backend": output.backend, "dpi": DPI}
         source = of.line.source if isinstance(of, RayFan) else PlaneWave(of.directions[0])
         known = far.error[np.isfinite(far.error)]
         off = f"; error {np.median(known):.1g} {far.unit} in the median" if len(known) else ""
-        title = f"{output.name}, {incident_words(source)}\n{self.told(far.unit)}, {far.boundary}{off}".replace(
-            "$", r"\$"
-        )
+        title = f"{output.name}, {incident_words(source)}\n{wave}, {far.boundary}{off}".replace("$", r"\$")
         # cuts of one step are one picture
-        cuts: dict[int, dict[str, FarField]] = {}
+        cuts: dict[int, tuple[FloatArray, dict[str, FarField]]] = {}
         for target, piece in zip(self.targets, self._pieces(far), strict=True):
             if target.kind == "cut":
-                cuts.setdefault(len(target.theta), {})[f"φ = {np.degrees(target.phi[0]):g}°"] = piece
-        # zeros, and what is not finite, cannot be drawn in decibels
-        drawn = [
-            one
-            for one in cuts.values()
-            if any(np.any(np.isfinite(piece.total) & (piece.total != 0)) for piece in one.values())
-        ]
-        for number, group in enumerate(drawn, 1):
-            theta = next(t.theta for t in self.targets if len(t.theta) == len(next(iter(group.values())).total))
-            words: dict[str, Any] = {"quantity": "rcs", "components": self.components, "title": title, "dpi": DPI}
-            names.append("far.png" if number == 1 else f"far_{number}.png")
-            plotting.far_cut_picture(folder / names[-1], theta, group, parts=len(group) == 1, angle_name="θ", **words)
+                _, group = cuts.setdefault(len(target.theta), (target.theta, {}))
+                group[f"φ = {np.degrees(target.phi[0]):g}°"] = piece
+        words: dict[str, Any] = {"quantity": "rcs", "components": self.components, "title": title, "dpi": DPI}
+        for theta, group in cuts.values():
+            # zeros, and what is not finite, cannot be drawn in decibels
+            if any(np.any(np.isfinite(piece.total) & (piece.total != 0)) for piece in group.values()):
+                names.append(f"far_{len(names) + 1}.png" if names else "far.png")
+                words |= {"parts": len(group) == 1, "angle_name": "θ"}
+                plotting.far_cut_picture(folder / names[-1], theta, group, **words)
         if far.error_by == "extinction":
             currents = cached_currents(of, self.wavenumber, self.boundary) if isinstance(of, RayFan) else of.currents()
             plotting.currents_picture(folder / "field.png", currents, **shown)
@@ -363,16 +356,11 @@ def parse_target(text: str, direction: FloatArray) -> Target:
         (azimuth,) = _numbers(text, plane, 1)
         return _cut(text, azimuth, _numbers(text, given, 1)[0]) if colon else _cut(text, azimuth, 1.0, fits=True)
     if name == "grid":
-        (step,) = _numbers(text, rest, 1)
-        parts = 180 / step if step > 0 else 0.0
-        if not (0 < step <= 90 and abs(parts - round(parts)) < 1e-9):
-            raise InvalidInputError(
-                f"--observe {text!r}: the step must divide 180 degrees and be at most 90, e.g. grid:5"
-            )
+        parts = _parts(text, _numbers(text, rest, 1)[0], 180, "grid:5")
         # before the arrays are made
         if 2 * parts**2 > MOST:
             raise InvalidInputError(f"--observe {text!r} asks for more than {MOST} directions; give a coarser grid")
-        theta, phi = np.linspace(0, np.pi, round(parts) + 1), np.linspace(0, 2 * np.pi, 2 * round(parts) + 1)
+        theta, phi = np.linspace(0, np.pi, parts + 1), np.linspace(0, 2 * np.pi, 2 * parts + 1)
         return Target("grid", text, theta, phi, grid_directions(theta, phi))
     pair = _numbers(text, text, 2)
     if not 0 <= pair[0] <= 180:
@@ -383,15 +371,21 @@ def parse_target(text: str, direction: FloatArray) -> Target:
 
 def _cut(text: str, azimuth: float, step: float, *, fits: bool = False) -> Target:
     """Directions of a plane from theta = -180 to 180 degrees."""
-    parts = 360 / step if step > 0 else 0.0
-    if not (0 < step <= 90 and abs(parts - round(parts)) < 1e-6):
-        raise InvalidInputError(
-            f"--observe {text!r}: the step must divide 360 degrees and be at most 90, e.g. cut:0:0.5"
-        )
+    parts = _parts(text, step, 360, "cut:0:0.5")
     if parts > MOST:
         raise InvalidInputError(f"--observe {text!r} asks for more than {MOST} directions; give a coarser step")
-    theta, phi = np.radians(np.linspace(-180.0, 180.0, round(parts) + 1)), np.radians([azimuth])
+    theta, phi = np.radians(np.linspace(-180.0, 180.0, parts + 1)), np.radians([azimuth])
     return Target("cut", text, theta, phi, grid_directions(theta, phi), fits)
+
+
+def _parts(text: str, step: float, whole: int, example: str) -> int:
+    """Steps in a half or a whole turn."""
+    parts = whole / step if step > 0 else 0.0
+    if not (0 < step <= 90 and abs(parts - round(parts)) < 1e-6):
+        raise InvalidInputError(
+            f"--observe {text!r}: the step must divide {whole} degrees and be at most 90, e.g. {example}"
+        )
+    return round(parts)
 
 
 def _numbers(text: str, rest: str, count: int) -> list[float]:
@@ -400,8 +394,6 @@ def _numbers(text: str, rest: str, count: int) -> list[float]:
     except ValueError:
         numbers = []
     if len(numbers) != count or not np.all(np.isfinite(numbers)):
-        raise InvalidInputError(
-            f"--observe {text!r} is unknown; give cut:PHI, cut:PHI:STEP, grid:STEP, THETA,PHI or backscatter, "
-            "in degrees"
-        )
+        known = "cut:PHI, cut:PHI:STEP, grid:STEP, THETA,PHI or backscatter, in degrees"
+        raise InvalidInputError(f"--observe {text!r} is unknown; give {known}")
     return numbers

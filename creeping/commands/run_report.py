@@ -26,8 +26,6 @@ from creeping.rays.ends import RayStatus
 from creeping.rays.fan import RayFan
 from creeping.rays.uncertain_body import body_uncertainty
 
-PLANES = {"incidence": None, "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
-
 
 @dataclass(frozen=True)
 class Plane:
@@ -47,19 +45,17 @@ def parse_plane(text: str) -> Plane:
         If the text has none of the known forms.
     """
     name, colon, rest = text.partition(":")
-    step = None
-    if colon:
-        try:
-            step = float(rest)
-        except ValueError:
-            step = np.nan
-    if name not in PLANES or (step is not None and not (np.isfinite(step) and step > 0)):
+    axes = {"incidence": None, "xy": [0, 1], "xz": [0, 2], "yz": [1, 2]}
+    try:
+        step = float(rest) if colon else None
+    except ValueError:
+        step = np.nan
+    if name not in axes or (step is not None and not (np.isfinite(step) and step > 0)):
         raise InvalidInputError(
             f"--plane {text!r} is unknown; give incidence, xy, xz or yz, with :STEP if it is not to fit "
             "the wave, e.g. xz:0.02"
         )
-    numbers = PLANES[name]
-    return Plane(text, None if numbers is None else np.eye(3)[list(numbers)], step)
+    return Plane(text, None if axes[name] is None else np.eye(3)[axes[name]], step)
 
 
 def write_planes(
@@ -115,9 +111,9 @@ def _plane_entry(plane: Plane, cut: FieldCut) -> dict[str, Any]:
 
 def plane_words(entry: dict[str, Any]) -> str:
     """One line on a field on a plane."""
-    states = ", ".join(f"{count} {name}" for name, count in entry["status"].items())
-    error = "" if entry["error_max"] is None else f"; error {entry['error_median']:.1e} in the median, "
-    error += "" if entry["error_max"] is None else f"{entry['error_max']:.1e} at most"
+    states, error = ", ".join(f"{count} {name}" for name, count in entry["status"].items()), ""
+    if entry["error_max"] is not None:
+        error = f"; error {entry['error_median']:.1e} in the median, {entry['error_max']:.1e} at most"
     return (
         f"field on the plane {entry['plane']}: {' x '.join(map(str, entry['points']))} points {entry['step']:.3g} "
         f"apart, {states}{error}; {entry['seconds']:.1f} s"
@@ -304,13 +300,12 @@ def readable_solved(summary: dict[str, Any], output: Path) -> str:
     field = summary["field"]
     error = field["error"]
     told = "" if error["rms"] is None else f"; error by {error['by']} {error['rms']:.2g} {field['unit']} rms"
-    return "\n".join(
-        [
-            f"no creeping rays: {summary['without_rays']}",
-            f"{field['boundary']} far field in {field['directions']} directions by the integral equation between "
-            f"{summary['nodes']} nodes, |f| up to {field['largest']:.4g} {field['unit']}{told}, "
-            f"{field['unresolved']} unresolved",
-            *map(plane_words, summary["planes"]),
-            f"{len(summary['files'])} files in {output} ({', '.join(summary['files'])}), {summary['seconds']:.1f} s",
-        ]
-    )
+    rows = [
+        f"no creeping rays: {summary['without_rays']}",
+        f"{field['boundary']} far field in {field['directions']} directions by the integral equation between "
+        f"{summary['nodes']} nodes, |f| up to {field['largest']:.4g} {field['unit']}{told}, "
+        f"{field['unresolved']} unresolved",
+        *map(plane_words, summary["planes"]),
+        f"{len(summary['files'])} files in {output} ({', '.join(summary['files'])}), {summary['seconds']:.1f} s",
+    ]
+    return "\n".join(rows)

@@ -14,6 +14,7 @@ from cyclopts import Group, Parameter
 from creeping._progress import Progress
 from creeping.commands import options
 from creeping.commands.options import flow_of, is_file, parse_body
+from creeping.errors import InvalidInputError
 
 _workers = Group("Workers")
 
@@ -52,7 +53,6 @@ def sweep(
 
     Exit code 4 if --resume would go on: some incidences are missing or failed. 3 if all of them failed.
     """
-    from creeping.errors import InvalidInputError
     from creeping.sweeping.study import EXAMPLE, read_study
 
     if example:
@@ -117,9 +117,8 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Prog
         require(package)
     text = str(read.folder / read.body) if is_file(read.body, read.folder) else read.body
     progress("body")
-    body = parse_body(
-        text, read.speed, options=options.FileOptions(units=read.units, **read.file), cache=cache, progress=progress
-    )
+    file = options.FileOptions(units=read.units, **read.file)
+    body = parse_body(text, read.speed, options=file, cache=cache, progress=progress)
     request = read.request_for(body)
     if request.wavenumbers:
         told = forecast(body, request.wavenumbers, parse_boundary(request.boundaries[0]), method=request.method)
@@ -133,14 +132,8 @@ def _prepared(read: Any, folder: Path, resume: bool, cache: bool, progress: Prog
     else:
         flow, chunk = _flow(read, body, request, cache, progress), task_size(request, len(read.incidences), read.chunk)
     request = with_lattice(request, read.incidences)
-    plan = SweepPlan(
-        flow,
-        request,
-        read.incidences,
-        chunk,
-        asked={"flow": read.flow, "tolerance": read.tolerance},
-        text=read.text,
-    )
+    asked = {"flow": read.flow, "tolerance": read.tolerance}
+    plan = SweepPlan(flow, request, read.incidences, chunk, asked=asked, text=read.text)
     return plan, open_store(plan, folder, resume=resume, note=progress.note)
 
 
@@ -230,15 +223,11 @@ def _summary(plan: Any, store: Any, complete: bool) -> dict[str, Any]:
 
 def _readable(summary: dict[str, Any]) -> str:
     counts = ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in summary["status"].items() if n)
-    now = (
-        f"{summary['incidences_now']} of them now, in {summary['seconds']:.1f} s "
-        f"({summary['incidences_per_second']:.3g} a second once under way)"
-    )
-    nothing = summary["complete"] and not summary["incidences_now"]
-    rows = [
-        f"{summary['incidences']} incidences, {summary['quantity']}: {counts}",
-        "nothing was missing" if nothing else now,
-    ]
+    rate = f"({summary['incidences_per_second']:.3g} a second once under way)"
+    now = f"{summary['incidences_now']} of them now, in {summary['seconds']:.1f} s {rate}"
+    if summary["complete"] and not summary["incidences_now"]:
+        now = "nothing was missing"
+    rows = [f"{summary['incidences']} incidences, {summary['quantity']}: {counts}", now]
     rows += [f"incidence {item['incidence']} failed: {item['error']}" for item in summary["failures"][:5]]
     if summary["status"]["failed"] > 5:
         rows.append(f"... {summary['status']['failed']} incidences failed; their incidence_status is 4")

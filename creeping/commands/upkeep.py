@@ -19,6 +19,7 @@ from typing import Any
 
 from creeping._version import __version__
 from creeping.commands import options
+from creeping.errors import CreepingError
 
 LIBRARIES = ("numpy", "scipy", "numba", "matplotlib", "pyvista", "vtk", "trimesh")
 OPTIONAL = {
@@ -58,7 +59,6 @@ def plain_numbers(text: str) -> str:
 
 def list_maps(*, json_: options.Json = False) -> int:
     """List the stored maps and fitted bodies."""
-    from creeping.errors import CreepingError
     from creeping.phaseflow import cache as caching
     from creeping.storage import folder as storing
     from scatterers.fits import cache as _fit_cache
@@ -96,7 +96,6 @@ def list_maps(*, json_: options.Json = False) -> int:
 
 def verify_maps() -> int:
     """Check every stored map and fitted body against its digests; exit code 3 if one is damaged."""
-    from creeping.errors import CreepingError
     from creeping.kernels.cache import require_private
     from creeping.storage import folder as storing
     from scatterers.fits import cache as _fit_cache
@@ -144,18 +143,16 @@ def clear_maps() -> int:
 
 
 def _stored() -> list[Path]:
-    from creeping.phaseflow import cache as caching
-    from creeping.storage import folder as storing
+    from creeping.phaseflow.cache import cache_folder
+    from creeping.storage.folder import MANIFEST
 
-    root = caching.cache_folder()
-    return sorted(p.parent for p in root.glob(f"*/{storing.MANIFEST}")) if root.is_dir() else []
+    return sorted(path.parent for path in cache_folder().glob(f"*/{MANIFEST}"))
 
 
 def _fits() -> list[Path]:
     from scatterers.fits import cache as _fit_cache
 
-    root = _fit_cache.cache_folder()
-    return sorted(root.glob("*.npz")) if root.is_dir() else []
+    return sorted(_fit_cache.cache_folder().glob("*.npz"))
 
 
 def doctor() -> int:
@@ -176,9 +173,8 @@ def doctor() -> int:
     print(f"  3-D graphics: {'pyvista' if probe.ok else f'matplotlib, because {probe.reason}'}")
     root = cache_folder()
     nearest = next(p for p in [root, *root.parents] if p.exists())
-    print(
-        f"  cache: {root} ({'writable' if os.access(nearest, os.W_OK) else 'NOT writable: maps are rebuilt each time'})"
-    )
+    writable = "writable" if os.access(nearest, os.W_OK) else "NOT writable: maps are rebuilt each time"
+    print(f"  cache: {root} ({writable})")
     return 3 if any(there[name] is None for name in LIBRARIES) else 0
 
 

@@ -40,8 +40,6 @@ from creeping.rays.transport import Flow
 from creeping.shadow.line import ShadowLine, shadow_line
 from creeping.storage.memory import budget
 
-MOST_STEPS = 192
-"""Of a ray."""
 NOTHING: FloatArray = np.zeros((0, 2, 3), dtype=np.float32)
 """No segments, in the precision of the page."""
 
@@ -149,11 +147,9 @@ class Preview:
     @cached_property
     def level_segments(self) -> tuple[FloatArray, FloatArray]:
         """Segments of the iso-phase curves (m, 2, 3), and the level of each (m,)."""
-        curves = self.curves
-        pieces = [segments(c.points[None], closed=c.closed) for c in curves]
-        return joined(pieces), np.concatenate(
-            [np.zeros(0), *(np.full(len(p), c.level) for p, c in zip(pieces, curves, strict=True))]
-        )
+        pieces = [segments(c.points[None], closed=c.closed) for c in self.curves]
+        levels = np.array([c.level for c in self.curves])
+        return joined(pieces), np.repeat(levels, [len(piece) for piece in pieces])
 
     @cached_property
     def launch_arcs(self) -> list[FloatArray]:
@@ -195,8 +191,8 @@ def preview_of(flow: Flow, request: ViewRequest, step: float) -> Preview:
 
 
 def steps_of(length: float, step: float) -> tuple[int, float]:
-    """Number and length of the steps of rays: so many steps as the flow takes at once that MOST_STEPS suffice."""
-    step *= max(1, int(np.ceil(length / (MOST_STEPS * step) - 1e-9)))
+    """Number and length of the steps of rays: so many steps as the flow takes at once that 192 suffice for a ray."""
+    step *= max(1, int(np.ceil(length / (192 * step) - 1e-9)))
     return max(2, round(length / step)), step
 
 
@@ -237,8 +233,6 @@ CUT_STEP = 2.0
 """Of the far-field cut, degrees."""
 PATIENCE = 20.0
 """Seconds at most of a T-matrix that is made while the hand rests."""
-BLOCK = 512
-"""Points of the body at a time: a newer request waits for no more."""
 IsStale = Callable[[], bool]
 
 
@@ -290,7 +284,7 @@ def refined_view(flow: Flow, frame: Preview, vertices: FloatArray, stale: IsStal
     fan = launch(flow, line, length=frame.fan.length, n_rays=request.rays, n_steps=steps)
     if stale():
         return None
-    angles = np.arange(-180.0, 180.0 + CUT_STEP / 2, CUT_STEP)
+    angles = np.arange(-180.0, 181.0, CUT_STEP)
     if speed_of(body) is not None:
         return Refined(request, drawn, line, fan, None, angles, None)
     levels, wave = _on_body(fan, request, vertices, stale)
@@ -344,9 +338,10 @@ def _on_body(
             return None, None
         if request.boundary == "pec":
             return current_levels(currents, vertices), None
-    values = np.empty(len(vertices), dtype=complex)
-    for first in range(0, len(vertices), BLOCK):
-        part = slice(first, first + BLOCK)
+    values, block = np.empty(len(vertices), dtype=complex), 512
+    for first in range(0, len(vertices), block):
+        # a newer request waits for no more points
+        part = slice(first, first + block)
         values[part] = surface_values(fan, vertices[part], wavenumber=k, boundary=request.kind)
         if stale():
             return None, None

@@ -21,7 +21,8 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import redirect_stdout, suppress
 from io import StringIO
-from threading import Condition, Event, RLock, Thread
+from queue import SimpleQueue
+from threading import Event, RLock, Thread
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -29,18 +30,9 @@ import viser
 
 from creeping._typing import Any
 from creeping.errors import CreepingError
+from creeping.explorer import frames
 from creeping.explorer.door import Door
-from creeping.explorer.frames import (
-    CUT_STEP,
-    Preview,
-    Refined,
-    far_cut,
-    made_matrix,
-    matrix_cut,
-    preview_of,
-    refined_view,
-    step_of,
-)
+from creeping.explorer.frames import Preview, Refined
 from creeping.explorer.panel import cut_svg, legend, plane_svg, preview_plane_svg, preview_text, refined_text, wave_note
 from creeping.explorer.request import BOUNDARIES, RAYS, ViewRequest, angles, wave_scale
 from creeping.explorer.scene import DrawnBody, Paint, Scene, Span, fitted_span, turned
@@ -51,13 +43,9 @@ from creeping.geometry.surface import size
 from creeping.rays.transport import Flow
 
 HOST = "127.0.0.1"
-FOLLOWING = 4.0
-"""Step of the far-field cut while the hand moves, degrees."""
-
-T = TypeVar("T")
-
 STEP = 30
 """Degrees between two pictures of a running wave."""
+T = TypeVar("T")
 
 
 class LocalServer(viser.ViserServer):  # type: ignore[misc]
@@ -106,10 +94,10 @@ class Explorer:
     def __init__(self, flow: Flow, request: ViewRequest, *, port: int = 8080, name: str = "creeping") -> None:
         self.flow, self.request = flow, request
         self.model = DrawnBody.of(flow.body)
-        self.step = step_of(flow.body)
+        self.step = frames.step_of(flow.body)
         # meshes of the line are made and kernels loaded before anybody looks
         with suppress(CreepingError):
-            preview_of(flow, request, self.step)
+            frames.preview_of(flow, request, self.step)
         self.seconds: deque[float] = deque(maxlen=1000)
         self.cut_seconds: deque[float] = deque(maxlen=1000)
         self._span: Span | None = None
@@ -243,7 +231,7 @@ class Explorer:
             request, number = taken
             began = time.perf_counter()
             try:
-                frame = preview_of(self.flow, request, self.step)
+                frame = frames.preview_of(self.flow, request, self.step)
                 self._span = span = fitted_span(frame.levels, self._span)
                 plane, text = preview_plane_svg(frame), preview_text(frame, time.perf_counter() - began, span)
                 with self._drawing:
@@ -301,8 +289,8 @@ class Explorer:
             (frame, number), _ = taken
             request, began, pace = frame.request, time.perf_counter(), 0.25
             try:
-                angles = np.arange(-180.0, 180.0 + CUT_STEP / 2, CUT_STEP)
-                if (exact := matrix_cut(self.flow.body, request, angles)) is not None:
+                angles = np.arange(-180.0, 181.0, frames.CUT_STEP)
+                if (exact := frames.matrix_cut(self.flow.body, request, angles)) is not None:
                     cut, pace = cut_svg(request, angles, exact), 0.0
                 else:
                     # of more nodes a cut takes more than half a second, and waits until the hand rests
@@ -312,8 +300,9 @@ class Explorer:
                         continue
                     # currents of a body that faces itself take seconds
                     method = "auto" if convex(frame.fan) else "rays"
-                    angles = np.arange(-180.0, 180.0 + FOLLOWING / 2, FOLLOWING)
-                    cut = cut_svg(request, angles, far_cut(frame.fan, request, angles, method))
+                    # while the hand moves the step is coarser
+                    angles = np.arange(-180.0, 181.0, 2 * frames.CUT_STEP)
+                    cut = cut_svg(request, angles, frames.far_cut(frame.fan, request, angles, method))
                 self.cut_seconds.append(time.perf_counter() - began)
                 with self._drawing:
                     # the refined cut of this request, if it came first, is the better one
@@ -332,7 +321,7 @@ class Explorer:
         while (taken := self._waves.take()) is not None:
             (frame, number), _ = taken
             with suppress(CreepingError):
-                if made_matrix(self.flow.body, frame.request):
+                if frames.made_matrix(self.flow.body, frame.request):
                     self._frames.put((frame, number))
 
     def _refine(self) -> None:
@@ -346,7 +335,7 @@ class Explorer:
             # the hand rests before work begins that would hold up its next move
             time.sleep(0.4)
             try:
-                found = None if stale() else refined_view(self.flow, frame, self.model.mesh.vertices, stale)
+                found = None if stale() else frames.refined_view(self.flow, frame, self.model.mesh.vertices, stale)
                 if found is None:
                     continue
                 text, plane = refined_text(found), plane_svg(found)
@@ -379,46 +368,36 @@ def _range(low: float, high: float, value: float) -> tuple[float, float, float]:
 
 
 class Latest(Generic[T]):
-    """Hands the latest value put in to one reader; values it had no time for are dropped."""
+    """Hands the latest value put in to one reader; values it had no time for are dropped.
+
+    Attributes
+    ----------
+    number : int
+        Values put in so far.
+    closed : bool
+        Whether `close` was called.
+    """
 
     def __init__(self) -> None:
-        self._changed = Condition()
-        self._value: T | None = None
-        self._number = 0
-        self._taken = 0
-        self._closed = False
-
-    @property
-    def number(self) -> int:
-        """Values put in so far."""
-        return self._number
-
-    @property
-    def closed(self) -> bool:
-        """Whether `close` was called."""
-        return self._closed
+        self.number, self.closed = 0, False
+        self._waiting: SimpleQueue[tuple[T, int] | None] = SimpleQueue()
 
     def put(self, value: T) -> None:
         """Replace what is waiting."""
-        with self._changed:
-            self._value, self._number = value, self._number + 1
-            self._changed.notify_all()
+        self.number += 1
+        self._waiting.put((value, self.number))
 
     def close(self) -> None:
         """Let the reader go."""
-        with self._changed:
-            self._closed = True
-            self._changed.notify_all()
+        self.closed = True
+        self._waiting.put(None)
 
     def take(self) -> tuple[T, int] | None:
         """Wait for a value not yet taken, and its number; None once closed."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._closed or self._taken < self._number)
-            if self._closed:
-                return None
-            self._taken = self._number
-            assert self._value is not None
-            return self._value, self._number
+        found = None if self.closed else self._waiting.get()
+        while not self._waiting.empty():
+            found = self._waiting.get()
+        return None if self.closed else found
 
 
 class Player:

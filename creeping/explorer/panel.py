@@ -97,18 +97,14 @@ def preview_plane_svg(frame: Preview) -> str:
 
 
 def _plane(
-    fan: RayFan,
-    curves: Sequence[IsoPhaseCurve],
-    lines: dict[str, list[FloatArray]],
-    *,
-    rays: int,
-    most: int | None = None,
+    fan: RayFan, curves: Sequence[IsoPhaseCurve], lines: dict[str, list[FloatArray]], rays: int, most: int | None = None
 ) -> str:
     """So many rays, curves of ``most`` points, and lines by status (n, 3) over the parameters."""
     body, torus = fan.body, is_torus(fan.line)
     axes = _Axes((-180, 180), (-180, 180) if torus else (180, 0), WIDTH if torus else 0.56 * WIDTH)
-    chosen = _some(fan, rays)
-    drawn = _broken(body.parameters(fan.points[chosen, :: 2 if most else 1])) if chosen else []
+    count = len(fan.points)
+    chosen = np.unique(np.linspace(0, count - 1, min(rays, count)).astype(int))
+    drawn = _broken(body.parameters(fan.points[chosen, :: 2 if most else 1])) if count else []
     parts = [axes.lines(drawn, RAY_COLOUR, 0.5, 0.6)]
     for curve in curves:
         points = curve.parameters[:: 1 + len(curve.parameters) // (most or len(curve.parameters) + 1)]
@@ -127,11 +123,6 @@ def _plane_frame(torus: bool) -> str:
     axes = _Axes((-180, 180), (-180, 180) if torus else (180, 0), WIDTH if torus else 0.56 * WIDTH)
     ticks = range(-180, 181, 90) if torus else range(0, 181, 45)
     return axes.frame(range(-180, 181, 60), ticks, ("psi" if torus else "phi") + " (degrees)", "theta (degrees)")
-
-
-def _some(fan: RayFan, most: int) -> Sequence[int]:
-    """Numbers of rays, evenly spread."""
-    return sorted(set(np.linspace(0, len(fan.points) - 1, min(most, len(fan.points))).astype(int).tolist()))
 
 
 def cut_svg(request: ViewRequest, angles: FloatArray, far: FarField | None) -> str:
@@ -155,10 +146,8 @@ def cut_svg(request: ViewRequest, angles: FloatArray, far: FarField | None) -> s
             continue
         # what is not resolved is no curve
         parts.append(axes.lines([inside[run] for run in runs if not doubt[run[0]]], colour, 1.2, dashes=dashes))
-        parts += [
-            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="1.5" fill="none" stroke="#888"/>'
-            for x, y in axes.place(inside[doubt])
-        ]
+        circle = '<circle cx="{:.1f}" cy="{:.1f}" r="1.5" fill="none" stroke="#888"/>'
+        parts += [circle.format(x, y) for x, y in axes.place(inside[doubt])]
     for number, name in enumerate(levels):
         dash = f' stroke-dasharray="{DASHES[number]}"' if DASHES[number] else ""
         parts.append(f'<path d="M{across:.0f},{TOP + 8}h16" stroke="{colours[name]}" stroke-width="1.2"{dash}/>')
@@ -274,16 +263,14 @@ def legend(frame: Preview, span: Span, *, still: bool = False, wave: bool = Fals
     if not still:
         # handles, in the colours that they have on the page
         rows.append(_keys({"arc: tilts d": "#ff2060", "tilts d": "#20df80", "turns d about itself": "#2080ff"}))
-    placed = "".join(f'<g transform="translate(0 {24 * number})">{row}</g>' for number, row in enumerate(rows))
-    box = f'viewBox="0 0 360 {24 * len(rows)}" width="100%"'
-    return f'<svg id="bar" xmlns="http://www.w3.org/2000/svg" {box}>{placed}</svg>'
+    placed = (f'<g transform="translate(0 {24 * number})">{row}</g>' for number, row in enumerate(rows))
+    return _picture("bar", 24 * len(rows), placed)
 
 
 def _bar(name: str, colours: Bytes, words: tuple[str, str, str]) -> str:
     """A bar of colours with words below its lower end, middle and upper end."""
-    stops = "".join(
-        f'<stop offset="{share:.2f}" stop-color="{_hex(colours, share)}"/>' for share in np.linspace(0, 1, 9)
-    )
+    shares = np.linspace(0, 1, 9)
+    stops = "".join(f'<stop offset="{share:.2f}" stop-color="{_hex(colours, share)}"/>' for share in shares)
     ends = zip(words, (8, 180, 352), ("start", "middle", "end"), strict=True)
     text = "".join(f'<text x="{x}" y="20" text-anchor="{anchor}" {_TEXT}>{word}</text>' for word, x, anchor in ends)
     fill = f'<defs><linearGradient id="{name}">{stops}</linearGradient></defs>'

@@ -38,9 +38,8 @@ Bytes = NDArray[np.uint8]
 Span = tuple[float, float]
 ENDED = (150, 156, 162)
 """Colour where a ray has ended or no ray passes."""
-_SHARE = np.arange(256) / 255
-LINEAR: Bytes = np.round(255 * np.where(_SHARE <= 0.04045, _SHARE / 12.92, ((_SHARE + 0.055) / 1.055) ** 2.4)).astype(
-    np.uint8
+LINEAR: Bytes = np.array(
+    [round(255 * (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4)) for c in np.arange(256) / 255], np.uint8
 )
 """Bytes of colours as the page takes them at vertices, where it has light and no sRGB."""
 FIELD_COLOURS, WAVE_COLOURS, LEVEL_COLOURS = (
@@ -55,11 +54,14 @@ def coloured(table: Bytes, share: FloatArray) -> Bytes:
     return table[np.clip(255 * np.asarray(share), 0, 255).astype(np.intp)]
 
 
+def _share(levels: FloatArray, span: Span) -> FloatArray:
+    low, high = span
+    return np.asarray((np.nan_to_num(levels, nan=low, posinf=high, neginf=low) - low) / (high - low))
+
+
 def strengths(values: ComplexArray, levels: FloatArray, span: Span) -> ComplexArray:
     """h u/|u| of fields (...) and their levels, dB: NaN where there is none, of modulus 1 at most."""
-    low, high = span
-    share = np.clip((np.nan_to_num(levels, nan=low, posinf=high, neginf=low) - low) / (high - low), 0.0, 1.0)
-    size = np.abs(values)
+    share, size = np.clip(_share(levels, span), 0.0, 1.0), np.abs(values)
     known = np.isfinite(size) & (size > 0)
     unit = np.where(known, values, 1.0) / np.where(known, size, 1.0)
     return np.where(levels > -np.inf, share * unit, np.nan)
@@ -91,9 +93,7 @@ def fitted_span(levels: FloatArray | None, before: Span | None = None) -> Span:
 
 def field_colours(levels: FloatArray, span: Span) -> Bytes:
     """Colours of decibels (...): ENDED where they are -inf or NaN, the highest on caustics (inf)."""
-    low, high = span
-    share = (np.nan_to_num(levels, nan=low, posinf=high, neginf=low) - low) / (high - low)
-    out = coloured(FIELD_COLOURS, share)
+    out = coloured(FIELD_COLOURS, _share(levels, span))
     out[~(levels > -np.inf)] = ENDED
     return out
 
@@ -176,25 +176,13 @@ class Scene:
         if still:
             self.incidence: Any = self.scene.add_frame("/incidence", show_axes=False, position=model.centre)
         else:
-            self.incidence = self.scene.add_transform_controls(
-                "/incidence",
-                scale=1.1 * model.radius,
-                disable_axes=True,
-                disable_sliders=True,
-                position=model.centre,
-                depth_test=True,
-            )
+            arcs = {"scale": 1.1 * model.radius, "disable_axes": True, "disable_sliders": True, "depth_test": True}
+            self.incidence = self.scene.add_transform_controls("/incidence", position=model.centre, **arcs)
         # along +z, and turned with the controls on the page itself; before and behind the body, which hides one of them
         shaft = np.array([[[0, 0, -1.55], [0, 0, -1.1]], [[0, 0, 1.1], [0, 0, 1.55]]]) * model.radius
         thick = 0.015 * model.radius
-        self.scene.add_arrows(
-            "/incidence/arrow",
-            shaft,
-            rgb(ARROW_COLOUR),
-            shaft_radius=thick,
-            head_radius=3 * thick,
-            head_length=8 * thick,
-        )
+        look = {"shaft_radius": thick, "head_radius": 3 * thick, "head_length": 8 * thick}
+        self.scene.add_arrows("/incidence/arrow", shaft, rgb(ARROW_COLOUR), **look)
 
     def look(self, direction: FloatArray) -> None:
         """Start the camera on the shadow side."""
@@ -266,13 +254,8 @@ class Scene:
         """The mesh of the body with colours (n, 3) at its vertices."""
         import trimesh
 
-        return trimesh.Trimesh(
-            self.model.inset,
-            self.model.mesh.triangles,
-            vertex_normals=self.model.normals,
-            vertex_colors=LINEAR[colours],
-            process=False,
-        )
+        at_vertices = {"vertex_normals": self.model.normals, "vertex_colors": LINEAR[colours]}
+        return trimesh.Trimesh(self.model.inset, self.model.mesh.triangles, process=False, **at_vertices)
 
     def refine(self, found: Refined, paint: Paint | None) -> None:
         """Draw what takes longer, with what `painted_mesh` has made."""
@@ -283,9 +266,8 @@ class Scene:
             self._line("outline", NOTHING, RAY_COLOUR)
             self._paint = paint
             if paint is not None:
-                self.painted = self.scene.add_mesh_trimesh(
-                    "/field", paint.mesh, cast_shadow=False, receive_shadow=False
-                )
+                unlit = {"cast_shadow": False, "receive_shadow": False}
+                self.painted = self.scene.add_mesh_trimesh("/field", paint.mesh, **unlit)
                 self.plain.visible = False
 
     def _line(self, name: str, points: FloatArray, colours: Any) -> None:
@@ -299,9 +281,8 @@ class Scene:
         paint = np.array(rgb(colours), dtype=np.uint8) if isinstance(colours, str) else LINEAR[colours]
         if handle is None:
             width = {"rays": 1.5, "levels": 2.0, "line": 4.0, "outline": 1.5}[name.split("/")[0]]
-            self._lines[name] = self.scene.add_line_segments(
-                f"/{name}", points, paint, thickness=width, thickness_units="screen"
-            )
+            look = {"thickness": width, "thickness_units": "screen"}
+            self._lines[name] = self.scene.add_line_segments(f"/{name}", points, paint, **look)
             return
         handle.points, handle.colors, handle.visible = points, paint, True
 

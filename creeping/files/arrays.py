@@ -121,10 +121,8 @@ def _words(texts: Any) -> tuple[Any, str]:
 
 def _line(line: ShadowLine) -> Content:
     unit, curves = unit_of(line.body), line.curves
-    numbers, vectors = (
-        {"arclength": unit, "curvature": power(unit, -1)},
-        {"points": unit, "normals": "1", "tangents": "1"},
-    )
+    numbers = {"arclength": unit, "curvature": power(unit, -1)}
+    vectors = {"points": unit, "normals": "1", "tangents": "1"}
     return {
         **_wave(line),
         "curve": (number_of(curves), ""),

@@ -37,9 +37,6 @@ from creeping.storage.atomic import written_aside
 if TYPE_CHECKING:
     from creeping.field.results.far_result import FarField
 
-MOST_BLOCKS = 10_000
-MOST_ROWS, MOST_KEYS = 5_000_000, 100
-"""Rows of a file, and keys of a block."""
 COLUMNS = ("Theta", "Phi", "Re(Etheta)", "Im(Etheta)", "Re(Ephi)", "Im(Ephi)")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
 
@@ -105,23 +102,12 @@ def _check_grid(far: FarField, theta: FloatArray, phi: FloatArray) -> None:
             f"by {phi.size} phi has {theta.size * phi.size}{remedy}"
         )
     off = np.linalg.norm(directions - grid_directions(theta, phi), axis=1)
-    wrong = int(np.sum(off > 1e-9))
-    if wrong:
+    if wrong := int(np.sum(off > 1e-9)):
         worst = int(np.argmax(off))
         raise InvalidInputError(
             f"a .ffe file holds a grid: {wrong} of {len(directions)} directions are not on it "
             f"(worst: row {worst}, off by {off[worst]:.2g}){remedy}"
         )
-
-
-def _trust(far: FarField) -> Iterator[str]:
-    """Comments on the errors, which the format has no columns for."""
-    served = ", ".join(sorted({str(name) for name in far.method}))
-    doubtful = f"{int(np.sum(far.unresolved))} of {len(far.method)} directions"
-    yield f"** computed by {served or 'nothing'}; unresolved in {doubtful}"
-    if far.stated_error is not None:
-        rms, worst = far.stated_error
-        yield f"** error of |f| by {far.error_source}: {rms:.3e} m rms over the directions, {worst:.3e} m at most"
 
 
 def _lines(far: FarField, theta: FloatArray, phi: FloatArray, direction: ArrayLike | None) -> Iterator[str]:
@@ -133,7 +119,12 @@ def _lines(far: FarField, theta: FloatArray, phi: FloatArray, direction: ArrayLi
     taken = "" if far.unit == "m" else "L is taken as the metre and "
     yield f"** frequency: {taken}the wave's speed as that of light"
     yield "** time factor exp(+jwt): complex conjugates of the far field f of creeping, exp(-iwt)"
-    yield from _trust(far)
+    served = ", ".join(sorted({str(name) for name in far.method}))
+    doubtful = f"{int(np.sum(far.unresolved))} of {len(far.method)} directions"
+    yield f"** computed by {served or 'nothing'}; unresolved in {doubtful}"
+    if far.stated_error is not None:
+        rms, worst = far.stated_error
+        yield f"** error of |f| by {far.error_source}: {rms:.3e} m rms over the directions, {worst:.3e} m at most"
     if not vector:
         yield "** SCALAR field: f stands in the columns of Etheta, those of Ephi are 0"
     for number, name in enumerate(("theta", "phi") if vector else ("scalar",)):
@@ -265,71 +256,67 @@ def _blocks(file: Path) -> Iterator[FfeBlock]:
     for number, line in lines_of(file, 512_000_000, 4096):
         if line.startswith(("##", "**")):
             continue
+        place = f"{file}, line {number}"
         if line.startswith("#"):
             if block.rows:
-                yield _closed(file, number, block)
+                yield _closed(f"{file}, block before line {number}", block)
                 blocks, block = blocks + 1, _Open()
-                if blocks >= MOST_BLOCKS:
-                    raise InvalidInputError(f"{file}, line {number}: more than {MOST_BLOCKS} blocks")
-            _header(file, number, line, block)
+                if blocks >= 10_000:
+                    raise InvalidInputError(f"{place}: more than 10000 blocks")
+            _header(place, line, block)
         else:
             rows += 1
-            if rows > MOST_ROWS:
-                raise InvalidInputError(f"{file}, line {number}: more than {MOST_ROWS} rows; split the file")
-            block.rows.extend(_row(file, number, line, block))
+            if rows > 5_000_000:
+                raise InvalidInputError(f"{place}: more than 5000000 rows; split the file")
+            block.rows.extend(_row(place, line, block))
     if block.rows:
-        yield _closed(file, number, block)
+        yield _closed(f"{file}, block before line {number}", block)
 
 
-def _header(file: Path, number: int, line: str, block: _Open) -> None:
+def _header(place: str, line: str, block: _Open) -> None:
     """Take over a key, or the names of the columns."""
     key, colon, value = line[1:].partition(":")
     if colon and key.strip() and '"' not in key:
         name, told = key.strip(), value.strip()
         if block.keys.setdefault(name, told) != told:
-            raise InvalidInputError(f"{file}, line {number}: {name[:40]!r} is given twice, with other values")
-        if len(block.keys) > MOST_KEYS:
-            raise InvalidInputError(f"{file}, line {number}: more than {MOST_KEYS} keys of one block")
+            raise InvalidInputError(f"{place}: {name[:40]!r} is given twice, with other values")
+        if len(block.keys) > 100:
+            raise InvalidInputError(f"{place}: more than 100 keys of one block")
         return
     names = re.findall(r'"([^"]*)"', line)
     missing = [name for name in COLUMNS if name not in names]
     if missing:
-        raise InvalidInputError(f"{file}, line {number}: no column {missing[0]} among {', '.join(names) or 'none'}")
+        raise InvalidInputError(f"{place}: no column {missing[0]} among {', '.join(names) or 'none'}")
     block.columns, block.count = [names.index(name) for name in COLUMNS], len(names)
 
 
-def _row(file: Path, number: int, line: str, block: _Open) -> list[float]:
+def _row(place: str, line: str, block: _Open) -> list[float]:
     cells = line.split()
     if not block.columns:
-        raise InvalidInputError(f"{file}, line {number}: a row before the names of the columns")
+        raise InvalidInputError(f"{place}: a row before the names of the columns")
     if len(cells) != block.count:
-        raise InvalidInputError(f"{file}, line {number}: {len(cells)} numbers in {block.count} columns")
-    texts = [cells[at] for at in block.columns]
-    strange = [text for text in texts if not _NUMBER.fullmatch(text)]
+        raise InvalidInputError(f"{place}: {len(cells)} numbers in {block.count} columns")
+    values = [float(text) if _NUMBER.fullmatch(text) else np.nan for text in cells]
+    strange = [cells[at] for at in block.columns if not np.isfinite(values[at])]
     if strange:
-        raise InvalidInputError(f"{file}, line {number}: {strange[0][:40]!r} is no finite number")
-    values = [float(text) for text in texts]
-    if not np.all(np.isfinite(values)):
-        raise InvalidInputError(f"{file}, line {number}: a number is not finite")
-    return values
+        raise InvalidInputError(f"{place}: {strange[0][:40]!r} is no finite number")
+    return [values[at] for at in block.columns]
 
 
-def _closed(file: Path, number: int, block: _Open) -> FfeBlock:
-    """The block that ends before a line."""
+def _closed(place: str, block: _Open) -> FfeBlock:
+    """The block that ends at a place."""
     sizes = []
     for key in ("No. of Theta Samples", "No. of Phi Samples"):
         if not re.fullmatch(r"[0-9]{1,9}", block.keys.get(key, "")):
-            raise InvalidInputError(f"{file}, block before line {number}: no whole number as {key!r}")
+            raise InvalidInputError(f"{place}: no whole number as {key!r}")
         sizes.append(int(block.keys[key]))
     rows = np.array(block.rows).reshape(-1, len(COLUMNS))
     if sizes[0] * sizes[1] != len(rows):
-        raise InvalidInputError(
-            f"{file}, block before line {number}: {len(rows)} rows, not {sizes[0]} theta x {sizes[1]} phi"
-        )
+        raise InvalidInputError(f"{place}: {len(rows)} rows, not {sizes[0]} theta x {sizes[1]} phi")
     text = block.keys.get("Frequency", "")
     hertz = float(text) if _NUMBER.fullmatch(text) else np.nan
     if not (np.isfinite(hertz) and hertz > 0):
-        raise InvalidInputError(f"{file}, block before line {number}: no positive number as 'Frequency'")
+        raise InvalidInputError(f"{place}: no positive number as 'Frequency'")
     e = np.stack([rows[:, 2] + 1j * rows[:, 3], rows[:, 4] + 1j * rows[:, 5]], axis=-1)
     name = block.keys.get("Configuration Name", "")
     return FfeBlock(name, hertz, rows[:, 0], rows[:, 1], np.conj(e), dict(block.keys))

@@ -24,9 +24,8 @@ MOST_ROWS, MOST_NUMBERS = 1_000_000, 20_000_000
 """Rows of a table, and numbers in all of them."""
 LONGEST = 65_536
 """Characters of a line."""
-HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "ghz": 1e9}
+HERTZ = {"ghz": 1e9, "mhz": 1e6, "khz": 1e3, "hz": 1.0}
 _ANGLE = re.compile(r"(angle|azimuth|phi|elev|theta|aspect|incidence|deg|(?<![a-z])(az|el)(?![a-z]))")
-_OTHER = re.compile(r"(phase|error|uncertain|unresolved|method|(?<![a-z])(re|im)(?![a-z]))")
 _POLARISATION = re.compile(r"(?<![a-z])(hh|vv|hv|vh)(?![a-z])")
 
 
@@ -81,9 +80,10 @@ def read_cut(path: str | os.PathLike[str]) -> MeasuredCut:
     names = header or ["angle", *(f"level {i}" for i in range(1, numbers.shape[1]))]
     at, over, scale = _abscissa(file, names, numbers)
     levels = {}
+    other = re.compile(r"(phase|error|uncertain|unresolved|method|(?<![a-z])(re|im)(?![a-z]))")
     for column, name in enumerate(names):
         lower = name.lower()
-        if column == at or _OTHER.search(lower) or _is_frequency(lower) or (_ANGLE.search(lower) and not _level(lower)):
+        if column == at or other.search(lower) or _is_frequency(lower) or (_ANGLE.search(lower) and not _level(lower)):
             continue
         values = numbers[:, column]
         if re.search(r"(m2|m\^2|sqm|sigma|linear)", lower) and "db" not in lower:
@@ -184,12 +184,10 @@ def _abscissa(file: Path, names: list[str], numbers: FloatArray) -> tuple[int, s
     found = []
     for column, name in enumerate(name.lower() for name in names):
         if _is_frequency(name):
-            unit = next((unit for unit in ("ghz", "mhz", "khz") if unit in name), "hz")
-            found.append((column, "frequency", HERTZ[unit]))
+            found.append((column, "frequency", next((size for unit, size in HERTZ.items() if unit in name), 1.0)))
         elif _ANGLE.search(name) and not _level(name):
-            found.append(
-                (column, "angle", float(np.degrees(1.0)) if re.search(r"(?<![a-z])rad(ian)?s?(?![a-z])", name) else 1.0)
-            )
+            radians = re.search(r"(?<![a-z])rad(ian)?s?(?![a-z])", name)
+            found.append((column, "angle", float(np.degrees(1.0)) if radians else 1.0))
     varied = [one for one in found if len(np.unique(numbers[:, one[0]])) > 1]
     if len(varied) > 1:
         raise InvalidInputError(f"{file} varies {' and '.join(names[one[0]] for one in varied)}; give a cut of one")

@@ -154,13 +154,11 @@ def write_touchstone(
 def _lines(hertz: float, factor: float, values: ComplexArray) -> Iterable[str]:
     """Lines of one frequency; of two ports, column by column on one line, as version 1 has it."""
     h = factor * np.conj(np.where(np.isfinite(values), values, 0.0))
-    rows = [h.T.ravel()] if len(h) == 2 else list(h)
-    first = True
-    for row in rows:
-        for begin in range(0, len(row), 4):
-            pairs = " ".join(f"{z.real!r} {z.imag!r}" for z in row[begin : begin + 4].tolist())
-            yield f"{hertz!r} {pairs}\n" if first else f"  {pairs}\n"
-            first = False
+    begin = f"{hertz!r}"
+    for row in [h.T.ravel()] if len(h) == 2 else h:
+        for four in np.split(row, range(4, len(row), 4)):
+            yield " ".join([begin, *(f"{z.real!r} {z.imag!r}" for z in four.tolist())]) + "\n"
+            begin = " "
 
 
 def write_stk(path: str | os.PathLike[str], echo: Echo, channel: str, frequency: int = 0) -> None:
@@ -191,11 +189,10 @@ def write_stk(path: str | os.PathLike[str], echo: Echo, channel: str, frequency:
             f"channel {channel!r} and frequency {frequency!r} are not among {', '.join(echo.channels)} and 0 to "
             f"{len(echo.wavenumbers) - 1}"
         )
-    pairs = {(round(a, 9), round(e, 9)) for a, e in zip(echo.azimuth.tolist(), echo.elevation.tolist(), strict=True)}
-    azimuths, elevations = {a for a, _ in pairs}, {e for _, e in pairs}
-    if min(len(azimuths), len(elevations)) < 2 or not len(azimuths) * len(elevations) == len(pairs) == len(
-        echo.azimuth
-    ):
+    angles = np.round([echo.azimuth, echo.elevation], 9)
+    pairs, (azimuths, elevations) = np.unique(angles, axis=1).T, map(np.unique, angles)
+    every = len(azimuths) * len(elevations)
+    if min(len(azimuths), len(elevations)) < 2 or not every == len(pairs) == len(echo.azimuth):
         raise InvalidInputError(
             f"a .rcs file holds a grid: {len(pairs)} directions are not all pairs of {len(azimuths)} azimuths and "
             f"{len(elevations)} elevations, two of each at least"

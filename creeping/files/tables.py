@@ -6,6 +6,7 @@ or value; its columns are explained in lines that begin with ``#``.
 
 import os
 from collections.abc import Callable, Iterable, Sequence
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -118,6 +119,11 @@ def number_of(parts: Sequence[Any]) -> Any:
     return np.repeat(np.arange(len(parts)), [len(one.points) for one in parts])
 
 
+def _complex(stem: str, suffix: str, values: Any, what: str, more: str = "imaginary part") -> list[Column]:
+    """Columns of complex values (rows,): what the real part is, and the imaginary one."""
+    return [(f"{stem}re{suffix}", what, values.real), (f"{stem}im{suffix}", more, values.imag)]
+
+
 def _position(points: FloatArray, unit: str) -> list[Column]:
     """Columns of points (rows, 3)."""
     return [(name, f"position, {unit}", values) for name, values in zip("xyz", points.T, strict=True)]
@@ -182,8 +188,7 @@ def _cut_columns(cut: Any) -> list[Column]:
     else:
         fields = {f"{one}{axis}": getattr(field, one)[:, i] for one in cut.quantities for i, axis in enumerate("xyz")}
     for name, values in fields.items():
-        columns.append((f"re_{name}", f"real part of {name}, {field.unit}; {_wave_words(field, unit)}", values.real))
-        columns.append((f"im_{name}", "imaginary part", values.imag))
+        columns += _complex("", f"_{name}", values, f"real part of {name}, {field.unit}; {_wave_words(field, unit)}")
     states = ", ".join(f"{int(one)} {one.name}" for one in FieldStatus)
     return [
         *columns,
@@ -227,15 +232,13 @@ def _far_columns(far: "FarField", observed: tuple[Sequence[str], FloatArray] | N
         )
         area = "dBsm" if unit == "m" else f"dB re 1 {unit}^2"
         columns += [
-            (f"re{suffix}", f"real part of the far field f, {unit}{name}; {_wave_words(far, unit)}", total.real),
-            (f"im{suffix}", "imaginary part", total.imag),
+            *_complex("", suffix, total, f"real part of the far field f, {unit}{name}; {_wave_words(far, unit)}"),
             (f"dB{suffix}", "20 log10 |f|, -inf where f is 0", decibels(total)),
             (f"rcs_dB{suffix}", f"10 log10(4 pi |f|^2), {area}", cross_section_decibels(total)),
             (f"error{suffix}", f"error of f, {unit}, {error_of}", error),
         ]
         for part, values in zip(far.parts, parts, strict=True):
-            columns.append((f"{part}_re{suffix}", f"part of f, {unit}{name}", values.real))
-            columns.append((f"{part}_im{suffix}", "imaginary part", values.imag))
+            columns += _complex(f"{part}_", suffix, values, f"part of f, {unit}{name}")
     doubt = "1 where a part was not found, its expansion fails or the error is large"
     columns.append(("method", "what gave the field, or its part of creeping rays", far.method))
     columns.append(("unresolved", doubt, np.asarray(far.unresolved).astype(int)))
@@ -279,13 +282,11 @@ def write_echo(path: str | os.PathLike[str], echo: "Echo", *, known: BoolArray |
         ("low_db", "level of |f| less its error", low[at]),
         ("high_db", "level of |f| and its error", high[at]),
         ("phase_deg", phase, np.degrees(np.angle(total))),
-        ("re_m", "real part of f", total.real),
-        ("im_m", "imaginary part of f", total.imag),
+        *_complex("", "_m", total, "real part of f", "imaginary part of f"),
         ("error_m", "of |f|", echo.error[at]),
     ]
     for part, values in echo.parts.items():
-        columns.append((f"{part}_re_m", f"{part} part of f", values[at].real))
-        columns.append((f"{part}_im_m", f"{part} part of f", values[at].imag))
+        columns += _complex(f"{part}_", "_m", values[at], *2 * [f"{part} part of f"])
     doubt = "1 where an expansion fails or the error is large"
     method = "rays; rays+optics of a body with edges; currents of all of it, by expansions or its equation; t-matrix"
     columns.append(("unresolved", doubt, echo.unresolved[at].astype(int)))
@@ -344,8 +345,7 @@ def write_couplings(
         ("receiver", "name of the port", np.tile(ports[pairs[1]], len(couplings))),
         ("level_db", f"20 log10 of the field of a unit moment, re {unit}", decibels(values)),
         ("error_db", "by how much the level may be higher", error_decibels(values, error)),
-        ("re", f"real part, {unit}; time factor exp(-i w t)", values.real),
-        ("im", f"imaginary part, {unit}", values.imag),
+        *_complex("", "", values, f"real part, {unit}; time factor exp(-i w t)", f"imaginary part, {unit}"),
         ("status", "of FieldStatus", [FieldStatus(code).name for one in couplings for code in one.status[pairs]]),
         ("method", "rays, or beams where geodesics merge", joined(one.method[pairs] for one in couplings)),
     ]
@@ -362,22 +362,21 @@ def write_paths(
     CreepingError
         If the file cannot be written.
     """
-    pairs = [(i, j) for i in range(len(names)) for j in range(i + 1, len(names))]
+    pairs = list(combinations(range(len(names)), 2))
     found = [[one.paths(i, j) for i, j in pairs] for one in couplings]
     every = [one for row in found for one in row]
     length, unit = couplings[0].length_unit, couplings[0].unit
-    which = [(ij, len(one)) for row in found for ij, one in zip(pairs, row, strict=True)]
+    counts, ends = [len(one) for one in every], np.array(names)[pairs * len(couplings)]
     wave = joined(one.wave for one in every)
     columns: list[Column] = [
         _wave_column(couplings, hertz, [sum(map(len, row)) for row in found]),
-        ("source", "name of the port", [names[i] for (i, _), count in which for _ in range(count)]),
-        ("receiver", "name of the port", [names[j] for (_, j), count in which for _ in range(count)]),
+        ("source", "name of the port", np.repeat(ends[:, 0], counts)),
+        ("receiver", "name of the port", np.repeat(ends[:, 1], counts)),
         ("arclength", length, joined(one.arclength for one in every)),
         ("caustics", "passed on the way", joined(one.caustics for one in every)),
         ("spreading", f"J2, {length}", joined(one.spreading for one in every)),
         ("xi", "Fock parameter, without unit", joined(one.fock_parameter for one in every)),
-        ("re", f"real part of the wave, {unit}", wave.real),
-        ("im", f"imaginary part of the wave, {unit}", wave.imag),
+        *_complex("", "", wave, f"real part of the wave, {unit}", f"imaginary part of the wave, {unit}"),
     ]
     for end in ("departure", "arrival"):
         vectors = joined((getattr(one, end) for one in every), 3)

@@ -285,12 +285,7 @@ def caption(body: Any, source: Incident, error: str = "", more: str = "", *, nam
     return "\n".join(filter(None, ["; ".join(filter(None, [first, error])), more]))
 
 
-def rays_caption(
-    line: ShadowLine,
-    fan: RayFan | None,
-    look: RayLook,
-    name: str = "",
-) -> str:
+def rays_caption(line: ShadowLine, fan: RayFan | None, look: RayLook, name: str = "") -> str:
     """Body, wave and error of rays, and up to where they are drawn; for the arguments see `picture`."""
     if fan is None:
         return caption(line.body, line.source, name=name)
@@ -331,14 +326,6 @@ def compose(
     else:
         direction = np.asarray(line.direction, dtype=float)
         camera = shadow_view(direction)
-    return Drawing(
-        body,
-        direction,
-        camera if view is None else view,
-        mesh,
-        normals,
-        strokes(line, fan, curves, rays=look.rays, ends=ends),
-        LevelColours.of(curves),
-        source=source,
-        title=rays_caption(line, fan, look, name),
-    )
+    drawn = strokes(line, fan, curves, rays=look.rays, ends=ends)
+    told: dict[str, Any] = {"source": source, "title": rays_caption(line, fan, look, name)}
+    return Drawing(body, direction, view or camera, mesh, normals, drawn, LevelColours.of(curves), **told)

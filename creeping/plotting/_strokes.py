@@ -88,11 +88,11 @@ class Stroke:
 
 def strokes(
     line: ShadowLine,
-    fan: RayFan | None,
-    curves: Sequence[IsoPhaseCurve],
+    fan: RayFan | None = None,
+    curves: Sequence[IsoPhaseCurve] = (),
     *,
-    rays: int,
-    ends: FloatArray,
+    rays: int = 0,
+    ends: FloatArray | None = None,
 ) -> list[Stroke]:
     """Everything to be drawn on the body, lowest rank first.
 
@@ -106,7 +106,7 @@ def strokes(
         Travel times at which the rays of the fan get paler, twice, and end, with the iso-phase curves.
     """
     found: list[Stroke] = []
-    if fan is not None:
+    if fan is not None and ends is not None:
         found += ray_strokes(fan, rays, ends)
     colours = LevelColours.of(curves)
     for curve in curves:

@@ -32,7 +32,7 @@ from creeping.geometry.piecewise import drawn_mesh
 from creeping.geometry.surface import Surface, normal, project, why_no_rays
 from creeping.geometry.triangulation import Triangulation
 from creeping.plotting._drawing import Drawing, View, caption, compose, shadow_view
-from creeping.plotting._strokes import LevelColours, Stroke, chosen_rays
+from creeping.plotting._strokes import LevelColours, Stroke, chosen_rays, strokes
 from creeping.plotting.pages import PAGE, add_bar, beyond, curve_style, dressed, save_figure, written_figure
 from creeping.plotting.pictures import chosen_backend, drawn_page
 from creeping.rays.fan import RayFan
@@ -40,8 +40,6 @@ from creeping.shadow.line import shadow_line
 
 NOTHING = "#b4b9bd"
 """Colour of what has no level."""
-WIDTH, REACH = 0.22, 2.5
-"""Standard deviation, in wavelengths, of the Gaussian that smooths currents, and where it ends, in it."""
 LEAST_SAMPLES = 4.5
 """Edges of triangles, or points of a grid, a wavelength from which fronts can be told."""
 CAUSTIC: dict[str, Any] = {"linewidth": 0.7, "linestyle": (0, (4, 3))}
@@ -192,8 +190,7 @@ def decay_picture(
         ax = figure.add_subplot()
         for number, (ray, level) in enumerate(zip(picked, levels, strict=True)):
             _draw_decay(ax, fan, ray, level, curve_style(number, 1.2))
-        ax.set_xlim(0.0, float(fan.travel_time[-1]))
-        ax.set_ylim(low, high)
+        ax.set(xlim=(0.0, float(fan.travel_time[-1])), ylim=(low, high))
         dressed(ax, f"arclength from the shadow line ({unit_of(fan.body)})", _name(kind))
         title = f"Field of single rays, k = {k:g}/{unit_of(fan.body)}, {_boundary_name(kind)} boundary"
         ax.set_title(title, fontsize=9, parse_math=False)
@@ -261,19 +258,14 @@ def currents_picture(
     backend = chosen_backend(backend)
     k = currents.wavenumber
     body: Any = currents.body
-    cells = cells or cells_of(body, k)
-    direction = currents.direction
-    line = None
-    if not why_no_rays(body):
-        # none is drawn that crosses itself
-        with suppress(SingularIncidenceError):
-            line = shadow_line(body, direction)
+    cells, direction = cells or cells_of(body, k), currents.direction
     title = caption(body, PlaneWave(direction), name=name)
-    if line:
-        drawing = replace(compose(line, view=view, cells=cells), title=title)
-    else:
-        camera = view or shadow_view(direction)
-        drawing = Drawing(body, direction, camera, *drawn_mesh(body, cells), [], LevelColours.of(()), title=title)
+    camera = view or shadow_view(direction)
+    drawing = Drawing(body, direction, camera, *drawn_mesh(body, cells), [], LevelColours.of(()), title=title)
+    if not why_no_rays(body):
+        # no line is drawn that crosses itself
+        with suppress(SingularIncidenceError):
+            drawing = replace(drawing, strokes=strokes(shadow_line(body, direction)))
     levels = current_levels(currents, drawing.mesh.vertices, incident)
     what = {"soft": "|∂u/∂n|/k", "conductor": "|n × H|"}.get(currents.boundary.kind, "|u|")
     wave = wave or f"k = {k:g}/{unit_of(currents.body)}"
@@ -311,20 +303,21 @@ def _currents_at(currents: SurfaceCurrents, points: FloatArray) -> tuple[Complex
     from scipy.spatial import cKDTree
 
     k = currents.wavenumber
-    width = WIDTH * 2 * np.pi / k
+    # standard deviation of the Gaussian, in wavelengths, and where it ends, in it
+    width, end = 0.22 * 2 * np.pi / k, 2.5
     n = normal(currents.body, points)
     tree = cKDTree(currents.points)
     total, share = np.zeros((len(points), *currents.values.shape[1:]), dtype=complex), np.zeros(len(points))
     flat = currents.values.reshape(len(currents.points), -1)
     for first in range(0, len(points), 4000):
         part = slice(first, first + 4000)
-        pairs = cKDTree(points[part]).sparse_distance_matrix(tree, REACH * width, output_type="ndarray")
+        pairs = cKDTree(points[part]).sparse_distance_matrix(tree, end * width, output_type="ndarray")
         row, node = pairs["i"] + first, pairs["j"]
         # not what is on the other side of a thin body
         facing = np.einsum("nc,nc->n", n[row], currents.normals[node]) > 0.3
         row, node, distance = row[facing], node[facing], pairs["v"][facing]
         weight = np.exp(-0.5 * (distance / width) ** 2) * currents.weights[node]
-        weight /= 2 * np.pi * width**2 * (1 - np.exp(-0.5 * REACH**2))
+        weight /= 2 * np.pi * width**2 * (1 - np.exp(-0.5 * end**2))
         phase = k * np.einsum("nc,nc->n", currents.travel[node], points[row] - currents.points[node])
         count = len(points[part])
         shape = (count, len(currents.points))
@@ -439,6 +432,5 @@ def with_fronts(drawing: Drawing, field: PointField, phase: float) -> Drawing:
     """
     known = field.ok & np.isfinite(field.values)
     asked: dict[str, Any] = {"wavenumber": field.wavenumber, "phase": phase}
-    return replace(
-        drawing, strokes=front_strokes(drawing.body, drawing.mesh, field.values, known, **asked) + drawing.strokes
-    )
+    fronts = front_strokes(drawing.body, drawing.mesh, field.values, known, **asked)
+    return replace(drawing, strokes=fronts + drawing.strokes)

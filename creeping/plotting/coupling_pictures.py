@@ -8,6 +8,7 @@ Sources: Derivations, F25.
 import os
 import re
 from collections.abc import Sequence
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -160,8 +161,8 @@ def plot_coupling(
     ax.set_xlabel("to port", fontsize=9)
     ax.set_ylabel("from port", fontsize=9)
     ax.tick_params(labelsize=8, width=0.5)
-    ax.xaxis.get_major_locator().set_params(integer=True)
-    ax.yaxis.get_major_locator().set_params(integer=True)
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.get_major_locator().set_params(integer=True)
     if names:
         ax.set_xticks(range(count), names, rotation=45 if max(map(len, names)) > 4 else 0)
         ax.set_yticks(range(count), names)
@@ -205,8 +206,7 @@ def plot_coupling_band(
     InvalidInputError
         If there are more pairs than curves that can be told apart.
     """
-    count = len(found[0].ports)
-    pairs = [(i, j) for i in range(count) for j in range(i + 1, count)]
+    pairs = list(combinations(range(len(found[0].ports)), 2))
     if len(pairs) > MOST_CURVES:
         raise InvalidInputError(f"{len(pairs)} pairs of ports are more than {MOST_CURVES} curves; plot single matrices")
     fresh, ax = pages.axes_or_new(ax, pages.PAGE)

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 SPAN = 60.0
 """Range of levels, dB."""
-SPANS = {"backscatter": 50.0, "waves": 120.0}
-"""Range of levels of each kind of picture of a T-matrix, dB."""
 
 
 def echo_picture(
@@ -123,7 +121,10 @@ def plot_echo(
     at = (slice(None), 0) if angles > 1 else (0, slice(None))
     curves = _curves(echo, at)
     low, high = heights_of(curves, span)
-    curves = _told_if_low(curves, low)
+    for number, curve in enumerate(curves):
+        # a word for those that lie below the picture as a whole
+        if np.nanmax(curve.levels, initial=-np.inf) < low:
+            curves[number] = replace(curve, label=f"{curve.label}, below {pages.minus(low)} dB")
     if angles > 1:
         draw_cut(ax, np.radians(echo.angles), curves, (low, high), level=_level(echo), angle_name=echo.angle_name)
     else:
@@ -165,16 +166,11 @@ def range_picture(
         alone = np.abs(range_profile(np.ones(len(echo.wavenumbers)), echo.wavenumbers).values)
         size = np.abs(strongest.values)
         alone = np.roll(alone, int(np.argmax(size)) - int(np.argmax(alone))) * float(np.max(size))
-        look: dict[str, Any] = {
-            "color": pages.GREY,
-            "alpha": 0.2,
-            "linewidth": 0,
-            "label": "strongest echo with side lobes",
-        }
-        ax.fill_between(strongest.range, low - 1, np.maximum(echo.levels(alone), low - 1), **look)
-        reach = next(iter(profiles.values())).range
-        ax.set_xlim(max(span[0], reach[0]), min(span[1], reach[-1]))
-        ax.set_ylim(low, high)
+        look: dict[str, Any] = {"color": pages.GREY, "alpha": 0.2, "linewidth": 0}
+        side = np.maximum(echo.levels(alone), low - 1)
+        ax.fill_between(strongest.range, low - 1, side, label="strongest echo with side lobes", **look)
+        reach = strongest.range
+        ax.set(xlim=(max(span[0], reach[0]), min(span[1], reach[-1])), ylim=(low, high))
         pages.dressed(ax, f"range along the line of sight (m), away from the {echo.viewer}", _level(echo))
         pages.finished(ax, True, title)
 
@@ -218,23 +214,11 @@ def comparison_picture(
 
 def _curves(echo: "Echo", at: tuple[Any, Any]) -> list[Curve]:
     levels, bounds = echo.levels(), np.stack(echo.bounds())
-    found = []
-    for number, channel in enumerate(echo.channels):
-        here = (number, *at)
-        finite: FloatArray = np.where(np.isposinf(levels[here]), np.nan, levels[here])
-        found.append(
-            Curve(channel, finite, pages.curve_style(number), bounds[(slice(None), *here)], echo.unresolved[here])
-        )
-    return found
-
-
-def _told_if_low(curves: list[Curve], low: float) -> list[Curve]:
-    """Curves, with a word in the legend for those that lie below the picture as a whole."""
+    levels[np.isposinf(levels)] = np.nan
+    places = [(number, *at) for number in range(len(echo.channels))]
     return [
-        replace(curve, label=f"{curve.label}, below {pages.minus(low)} dB")
-        if np.nanmax(curve.levels, initial=-np.inf) < low
-        else curve
-        for curve in curves
+        Curve(channel, levels[here], pages.curve_style(here[0]), bounds[(slice(None), *here)], echo.unresolved[here])
+        for channel, here in zip(echo.channels, places, strict=True)
     ]
 
 
@@ -352,10 +336,8 @@ def _ends(values: FloatArray, start: float | None, end: float | None) -> tuple[f
     high = float(values[-1]) if end is None else float(end)
     # written so that NaN fails
     if not (low < high and np.any((values >= low) & (values <= high))):
-        raise InvalidInputError(
-            f"nothing lies between start = {low:g} and end = {high:g}; "
-            f"values reach from {values[0]:g} to {values[-1]:g}"
-        )
+        reach = f"values reach from {values[0]:g} to {values[-1]:g}"
+        raise InvalidInputError(f"nothing lies between start = {low:g} and end = {high:g}; {reach}")
     return low, high
 
 
@@ -388,13 +370,15 @@ def plot_t_matrix(
     InvalidInputError
         On an unknown kind or component.
     """
-    if kind not in SPANS:
-        raise InvalidInputError(f"kind {kind!r} is unknown; give {' or '.join(SPANS)}")
+    # range of levels of each kind of picture, dB
+    spans = {"backscatter": 50.0, "waves": 120.0}
+    if kind not in spans:
+        raise InvalidInputError(f"kind {kind!r} is unknown; give {' or '.join(spans)}")
     if component is not None and (component not in COMPONENTS or not T.vector):
         known = f"give {', '.join(COMPONENTS)}" if T.vector else "a scalar field has none"
         raise InvalidInputError(f"component {component!r} is unknown; {known}")
     fresh, ax = pages.axes_or_new(ax, pages.PAGE)
-    span = SPANS[kind] if span is None else span
+    span = spans[kind] if span is None else span
     if kind == "backscatter":
         _draw_backscatter(ax, T, component, span)
     else:
@@ -421,7 +405,7 @@ def averages_picture(
     """
     name, unit = LEVELS[quantity]
     scale, hertz_name = suited(float(hertz.max()))
-    low, high = shown_range([levels - error, levels + error], SPANS["backscatter"], step=1.0)
+    low, high = shown_range([levels - error, levels + error], 50.0, step=1.0)
     with pages.written_figure(path, pages.PAGE, dpi) as figure:
         ax = figure.add_subplot()
         look = {"color": pages.COLOURS[0], "alpha": 0.18, "linewidth": 0}

@@ -293,10 +293,8 @@ def _picks(label: str, values: Any, count: int, components: Sequence[str]) -> li
         raise InvalidInputError(
             f"field {label!r} has shape {shape}; {count} angles take ({count},) or ({count}, 2, 2) complex numbers"
         )
-    return [
-        (f" {component_name(name)}", lambda v, at=COMPONENTS[name]: np.asarray(v)[:, at[0], at[1]])
-        for name in components
-    ]
+    picks = {name: lambda v, at=COMPONENTS[name]: np.asarray(v)[:, *at] for name in components}
+    return [(f" {component_name(name)}", pick) for name, pick in picks.items()]
 
 
 def component_name(name: str) -> str:
@@ -322,13 +320,11 @@ def _straight_axes(ax: Any, angle: FloatArray, heights: tuple[float, float], lab
     left, right = np.degrees(angle.min()), np.degrees(angle.max())
     if ax.lines:
         left, right = min(left, ax.get_xlim()[0]), max(right, ax.get_xlim()[1])
-    ax.set_xlim(left, right)
-    ax.set_ylim(*heights)
+    ax.set(xlim=(left, right), ylim=heights)
     # multiples of 15, 30, 45, ... degrees
     ax.xaxis.set_major_locator(MaxNLocator(9, steps=[1, 1.5, 2, 3, 4.5, 6, 9, 10]))
     pages.dressed(ax, f"{angle_name} (degrees)", label)
-    for spine in ax.spines.values():
-        spine.set_linewidth(0.5)
+    ax.spines[:].set_linewidth(0.5)
 
 
 def _round_axes(ax: Any, _: FloatArray, heights: tuple[float, float], label: str, angle_name: str) -> None:
@@ -416,11 +412,9 @@ def plot_far(
     labels = [curve.label.removeprefix("total").lstrip(", ") or curve.label for curve in curves]
     curves = [curve.ordered(cut.order, label) for curve, label in zip(curves, labels, strict=True)]
     fresh, ax = pages.axes_or_new(ax, pages.PAGE)
-    unit = unit or far.unit
-    draw_cut(
-        ax, cut.values[cut.order], curves, heights, level=level_name(quantity, unit, [far.total]), angle_name=cut.name
-    )
-    _mark(ax, cut.values[cut.order], curves, heights[1])
+    unit, values = unit or far.unit, cut.values[cut.order]
+    draw_cut(ax, values, curves, heights, level=level_name(quantity, unit, [far.total]), angle_name=cut.name)
+    _mark(ax, values, curves, heights[1])
     return pages.finished(ax, fresh, f"{pages.wave_title(far, unit)} boundary", legend)
 
 

@@ -78,8 +78,7 @@ def plot_line(
         If the kind is unknown or not that of the axes, or a view is given for the plane.
     """
     if isinstance(line, RayFan):
-        fan = line
-        line = fan.line
+        fan, line = line, line.line
     elif isinstance(line, ShadowCurve):
         line = line_of(line)
     if _in_space(ax, kind):
@@ -287,30 +286,21 @@ def _add(ax: Any, pieces: Sequence[FloatArray], *, label: str = "", **style: Any
 def frame(ax: Any, *, torus: bool) -> None:
     """Axes of the plane: (phi, theta), or (psi, theta) all the way round on a torus, in degrees."""
     name = "psi" if torus else "phi"
-    ax.set_xlim(-180, 180)
-    ax.set_xticks(range(-180, 181, 60))
+    ax.set(xlim=(-180, 180), xticks=range(-180, 181, 60))
     # a polar angle grows from the upper pole down, like the picture of the body
-    ax.set_ylim(*((-180, 180) if torus else (180, 0)))
-    ax.set_yticks(range(-180, 181, 60) if torus else range(0, 181, 30))
+    ax.set(ylim=(-180, 180) if torus else (180, 0), yticks=range(-180, 181, 60) if torus else range(0, 181, 30))
     ax.set_xlabel(rf"$\{name}$ (degrees)", fontsize=9)
     ax.set_ylabel(r"$\theta$ (degrees)", fontsize=9)
     ax.set_aspect("equal")
     ax.tick_params(labelsize=8, direction="in", top=True, right=True, width=0.5)
-    for spine in ax.spines.values():
-        spine.set_linewidth(0.5)
+    ax.spines[:].set_linewidth(0.5)
 
 
 def _add_legend(ax: Any, colours: LevelColours) -> None:
-    handles, labels = ax.get_legend_handles_labels()
-    order = sorted(range(len(labels)), key=lambda k: not labels[k].startswith("shadow"))
-    ax.figure.legend(
-        [handles[k] for k in order],
-        [labels[k] for k in order],
-        loc="outside lower center" if ax.figure.get_layout_engine() is not None else "lower center",
-        ncols=min(3, max(1, len(labels))),
-        frameon=False,
-        fontsize=8,
-    )
+    named = sorted(zip(*ax.get_legend_handles_labels(), strict=True), key=lambda one: not one[1].startswith("shadow"))
+    place = "outside lower center" if ax.figure.get_layout_engine() is not None else "lower center"
+    look: dict[str, Any] = {"loc": place, "ncols": min(3, max(1, len(named))), "frameon": False, "fontsize": 8}
+    ax.figure.legend([handle for handle, _ in named], [label for _, label in named], **look)
     # without levels to tell apart there is no bar, and no place for one
     if colours.high > colours.low:
         colours.add_bar(ax.figure, cax=ax.inset_axes((1.03, 0.0, 0.025, 1.0)))

@@ -27,12 +27,8 @@ from creeping.shadow.line import ShadowLine
 
 TITLE_SIZE = 8.0
 """Of the letters of a title, points."""
-FINER = 1.6
-"""Pixels of what OpenGL renders for each of the file, along a side."""
 BAD_COLOUR = "#b3202a"
 """Of vertices that are rough."""
-MESH_INCHES = (7.2, 3.4)
-"""Of the picture of one mesh."""
 Place = tuple[float, float, float, float]  # left, bottom, width, height, as shares of the figure
 
 
@@ -144,10 +140,12 @@ def _page(drawing: Drawing) -> tuple[Any, Place]:
 def _draw_pyvista(figure: Any, place: Place, drawing: Drawing, dpi: int) -> None:
     """Render the scene without any text, which matplotlib then sets, sharper and as in the other backend."""
     ax = figure.add_axes(place)
-    # more pixels than the file has: reduced on saving, which smooths every edge
-    inches = figure.get_size_inches()
-    width, height = (round(FINER * dpi * float(size) * share) for size, share in zip(inches, place[2:], strict=True))
-    image = render(drawing, (width, height), scale=FINER * dpi / 72)
+    # more pixels along a side than the file has: reduced on saving, which smooths every edge
+    dots = 1.6 * dpi
+    width, height = (
+        round(dots * inches * share) for inches, share in zip(figure.get_size_inches(), place[2:], strict=True)
+    )
+    image = render(drawing, (width, height), scale=dots / 72)
     low, high = drawing.frame
     middle = 0.5 * (low + high)
     half_height = max(0.5 * float(high[1] - low[1]), 0.5 * float(high[0] - low[0]) * height / width)
@@ -220,16 +218,9 @@ def _draw_stroke(ax: Any, drawing: Drawing, stroke: Stroke) -> None:
     ]
     for pieces, share, above in ((hidden, HIDDEN if stroke.through else 0.0, 0), (visible, 1.0, 10)):
         if pieces and share > 0:
-            lines = Line3DCollection(
-                pieces,
-                colors=stroke.colour,
-                linewidths=stroke.width,
-                alpha=stroke.alpha * share,
-                capstyle="butt",
-                joinstyle="round",
-                zorder=2 + stroke.rank + above,
-            )
-            ax.add_collection3d(lines)
+            look: dict[str, Any] = {"colors": stroke.colour, "linewidths": stroke.width, "alpha": stroke.alpha * share}
+            look |= {"capstyle": "butt", "joinstyle": "round", "zorder": 2 + stroke.rank + above}
+            ax.add_collection3d(Line3DCollection(pieces, **look))
 
 
 def _frame(ax: Any, drawing: Drawing) -> None:
@@ -239,7 +230,7 @@ def _frame(ax: Any, drawing: Drawing) -> None:
     ax.set_axis_off()
     ax.set_proj_type("ortho")
     ax.view_init(elev=np.degrees(drawing.view.elevation), azim=np.degrees(drawing.view.azimuth))
-    _limits(ax, drawing.centre, half)
+    ax.set(**{f"{axis}lim": (at - half, at + half) for axis, at in zip("xyz", drawing.centre, strict=True)})
     ax.set_box_aspect((1, 1, 1), zoom=1.0)
     # mplot3d does not say how large it draws nor where: measure, correct the size, measure, correct the place
     place = ax.get_position(original=True).transformed(ax.figure.transSubfigure)
@@ -247,12 +238,8 @@ def _frame(ax: Any, drawing: Drawing) -> None:
     ax.set_box_aspect((1, 1, 1), zoom=float(np.min(np.array([place.width, place.height]) / (unit * (high - low)))))
     centre, unit = _measure(ax, drawing)
     off = (centre - 0.5 * (place.min + place.max)) / unit
-    _limits(ax, drawing.centre + off[0] * drawing.view.right + off[1] * drawing.view.up, half)
-
-
-def _limits(ax: Any, centre: FloatArray, half: float) -> None:
-    for axis, value in zip("xyz", centre, strict=True):
-        getattr(ax, f"set_{axis}lim")(value - half, value + half)
+    moved = drawing.centre + off[0] * drawing.view.right + off[1] * drawing.view.up
+    ax.set(**{f"{axis}lim": (at - half, at + half) for axis, at in zip("xyz", moved, strict=True)})
 
 
 def _measure(ax: Any, drawing: Drawing) -> tuple[FloatArray, FloatArray]:
@@ -310,7 +297,7 @@ def mesh_picture(
     CreepingError
         If the file cannot be written.
     """
-    figure = new_figure((MESH_INCHES[0], MESH_INCHES[1] * len(meshes)))
+    figure = new_figure((7.2, 3.4 * len(meshes)))
     for row, mesh in enumerate(meshes):
         _draw_mesh(figure, 1 - (row + 1) / len(meshes), 1 / len(meshes), mesh, label)
     save_figure(figure, path, dpi)

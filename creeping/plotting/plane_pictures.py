@@ -260,12 +260,10 @@ def hatch(cut: FieldCut, ax: Any, size: FloatArray | None) -> None:
     for where, pattern, colour in marks:
         if not np.any(where):
             continue
+        look: dict[str, Any] = {"colors": "none", "hatches": [pattern], "zorder": 1.5}
+        filled = ax.contourf(cut.across, cut.up, where.astype(float), [0.5, 1.5], **look)
         # the colour of hatches is that of edges
-        filled = ax.contourf(
-            cut.across, cut.up, where.astype(float), [0.5, 1.5], colors="none", hatches=[pattern], zorder=1.5
-        )
-        filled.set_edgecolor(colour)
-        filled.set_linewidth(0.0)
+        filled.set(edgecolor=colour, linewidth=0.0)
 
 
 def dress(cut: FieldCut, ax: Any) -> None:
@@ -291,9 +289,7 @@ def dress(cut: FieldCut, ax: Any) -> None:
         arrow["path_effects"] = [withStroke(linewidth=3.2, foreground="#ffffff")]
         ends = middle + 0.08 * along, middle - 0.05 * along
         ax.annotate("", *ends, xycoords="axes fraction", textcoords="axes fraction", arrowprops=arrow)
-    ax.set_aspect("equal")
-    ax.set_xlim(cut.across[0], cut.across[-1])
-    ax.set_ylim(cut.up[0], cut.up[-1])
+    ax.set(aspect="equal", xlim=cut.across[[0, -1]], ylim=cut.up[[0, -1]])
     ax.set_xlabel(_axis(cut, 0) + _place(cut), fontsize=9)
     ax.set_ylabel(_axis(cut, 1), fontsize=9)
     ax.tick_params(labelsize=8, width=0.5)

@@ -22,7 +22,6 @@ from creeping.plotting._drawing import Drawing
 from creeping.plotting._strokes import BODY_COLOUR, HIDDEN, Stroke
 
 REMEDY = "on Debian or Ubuntu install libegl1 libgl1-mesa-dri libx11-6"
-TIMEOUT = 60.0
 _SCRIPT = """
 import pyvista
 plotter = pyvista.Plotter(off_screen=True, window_size=(16, 16))
@@ -100,14 +99,8 @@ def _add_body(plotter: Any, drawing: Drawing) -> None:
 
 
 def _add_stroke(plotter: Any, stroke: Stroke, scale: float, name: str) -> None:
-    actor = plotter.add_mesh(
-        polylines(stroke.lines),
-        color=stroke.colour,
-        line_width=stroke.width * scale,
-        opacity=stroke.alpha,
-        lighting=False,
-        name=name,
-    )
+    look = {"color": stroke.colour, "line_width": stroke.width * scale, "opacity": stroke.alpha, "lighting": False}
+    actor = plotter.add_mesh(polylines(stroke.lines), name=name, **look)
     # the mesh and the polylines both sag by about the square of their spacing, so lines are drawn a little nearer
     # to the camera, by rank, in units of 1/65000 of the depth of the scene; in depth only: lifting them off the body
     # would bulge its outline
@@ -174,11 +167,10 @@ def _probe() -> GLProbe:
     """Render in a subprocess."""
     try:
         # no terminal, and its messages kept: VTK warns about a missing X server even where EGL then succeeds
-        done = subprocess.run(
-            [sys.executable, "-c", _SCRIPT], capture_output=True, stdin=subprocess.DEVNULL, timeout=TIMEOUT, check=False
-        )
+        asked: dict[str, Any] = {"capture_output": True, "stdin": subprocess.DEVNULL, "timeout": 60, "check": False}
+        done = subprocess.run([sys.executable, "-c", _SCRIPT], **asked)
     except subprocess.TimeoutExpired:
-        return GLProbe(False, f"the trial rendering took more than {TIMEOUT:.0f} s")
+        return GLProbe(False, "the trial rendering took more than 60 s")
     except OSError as error:
         return GLProbe(False, f"the trial rendering could not start ({error})")
     if done.returncode == 0:

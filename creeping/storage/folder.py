@@ -18,7 +18,6 @@ from creeping.storage.atomic import bytes_of
 
 SCHEMA = 4
 MANIFEST = "manifest.json"
-_MAX_MANIFEST = 1_000_000
 TYPES = {
     name: getattr(np, name) for name in ("float32", "float64", "complex64", "complex128", "uint8", "int64", "bool")
 }
@@ -71,7 +70,7 @@ def read_manifest(folder: Path, *, any_schema: bool = False) -> dict[str, Any]:
     """
     path = folder / MANIFEST
     try:
-        document = json.loads(bytes_of(path, _MAX_MANIFEST))
+        document = json.loads(bytes_of(path, 1_000_000))
         content = document["content"]
         intact = document["blake2b"] == content_digest(content)
         if not isinstance(content, dict):

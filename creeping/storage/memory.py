@@ -18,8 +18,6 @@ UNKNOWN = 8 * 10**9
 """Free memory where the system does not tell."""
 ALWAYS = 64 * 10**6
 """Bytes that are not asked about."""
-GROUPS, GROUPS_AT = Path("/proc/self/cgroup"), Path("/sys/fs/cgroup")
-"""Control groups of this process, and where they are told of."""
 
 
 def budget() -> float:
@@ -87,8 +85,10 @@ def blocks(count: int, each: float) -> list[slice]:
     return [slice(begin, min(begin + size, count)) for begin in range(0, max(count, 1), max(size, 1))]
 
 
-def _left_to_containers(groups: Path = GROUPS, root: Path = GROUPS_AT) -> Iterator[float]:
-    """What this process's control groups and those around them may still take, bytes."""
+def _left_to_containers(
+    groups: Path = Path("/proc/self/cgroup"), root: Path = Path("/sys/fs/cgroup")
+) -> Iterator[float]:
+    """What this process's control ``groups`` and those around them, told of in ``root``, may still take, bytes."""
     try:
         lines = [line.split(":", 2) for line in groups.read_text().splitlines()]
     except OSError:

@@ -24,14 +24,12 @@ Sources: [AS64, sec. 25.2]; Derivations, F23.
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.waves.far_geometry import FarGeometry
 from creeping.field.waves.far_rays import Parts, isolated, sheets_of
-from creeping.geometry.surface import Surface
 from creeping.rays.transport import Flow
 from creeping.shadow.status import FOLLOWED, OK
 from creeping.sweeping.lattice import FINER, Lattice
@@ -45,8 +43,6 @@ BASE = 2
 SAFE, NOISE = 2.0, 1e-5
 """Stated error over the differences, and what the flow and the searches for rays leave, over the sheets' sizes; both
 set on six bodies."""
-OF_CREEPING = 10.0
-"""Error allowed to the creeping part, of its own size, over that allowed to the whole field."""
 NEAR = 12.0
 """Largest distance of neighbouring sheets, in body sizes and steps of the lattice."""
 
@@ -72,14 +68,6 @@ def _lagrange(place: FloatArray, some: slice) -> FloatArray:
     out, nodes = np.zeros((len(place), len(NODES))), NODES[some]
     for j, own in zip(range(len(NODES))[some], nodes, strict=True):
         out[:, j] = np.prod([(place - other) / (own - other) for other in nodes if other != own], axis=0)
-    return out
-
-
-def totals(values: FloatArray) -> FloatArray:
-    """Sums (n,) of rows (m, n), one after the other."""
-    out: FloatArray = values[0]
-    for row in values[1:]:
-        out = out + row
     return out
 
 
@@ -182,22 +170,6 @@ def chains(start: IntArray, after: IntArray, before: IntArray) -> IntArray:
     return out
 
 
-class Cells(NamedTuple):
-    """Cells of one level with the nodes of their stencils.
-
-    Attributes
-    ----------
-    stencil : (cells, 6) of int
-        Nodes of each cell.
-    chains : list of (n, 6) or None
-        Of each cell its sheets at all nodes; None where a node has no field that is the sum of its sheets, or sheets
-        begin or end.
-    """
-
-    stencil: IntArray
-    chains: list[IntArray | None]
-
-
 class Nodes:
     """Nodes of a lattice, each computed once, whatever levels it belongs to.
 
@@ -229,11 +201,12 @@ class Nodes:
         self.path: FloatArray = np.zeros(0)
         self.amplitudes: ComplexArray | None = None
 
-    def __len__(self) -> int:
-        return len(self._known)
+    def cells(self, level: int, own: IntArray) -> tuple[IntArray, list[IntArray | None]]:
+        """Nodes (n, 6) and sheets of the stencils of cells of a level, by the numbers of their own nodes (n,).
 
-    def cells(self, level: int, own: IntArray) -> Cells:
-        """Cells of a level by the numbers of their own nodes (n,)."""
+        Sheets (m, 6) at all nodes are None where a node has no field that is the sum of its sheets, or sheets begin or
+        end.
+        """
         lattice = self._lattice
         numbers, place = np.unique(lattice.wrapped(own[:, None] + NODES, level), return_inverse=True)
         nodes = self._at(level, numbers)
@@ -252,7 +225,7 @@ class Nodes:
             chain = chains(np.arange(first, first + counts[cell, 0]), after, before)
             if np.all(chain >= 0):
                 found[cell] = chain
-        return Cells(stencil, found)
+        return stencil, found
 
     def _at(self, level: int, numbers: IntArray) -> IntArray:
         """Nodes of a level by their numbers (n,): (n,)."""
@@ -289,27 +262,6 @@ class Nodes:
             self.amplitudes = np.concatenate([*([] if self.amplitudes is None else [self.amplitudes]), *amplitudes])
 
 
-class Problem(NamedTuple):
-    """Results of one boundary and wavenumber.
-
-    Attributes
-    ----------
-    which : tuple of int
-        Its place in arrays of results, after the incidence.
-    suffix : str
-        Of their names.
-    difference : (n, m) or (n, m, 2, 2), L
-        Error of the interpolation.
-    arrays : dict
-        As of `FieldArrays`.
-    """
-
-    which: tuple[int, ...]
-    suffix: str
-    difference: FloatArray
-    arrays: Arrays
-
-
 class FieldsBetween:
     """Fields of incidences, interpolated where that is good enough; called as a `Sweeper` is.
 
@@ -337,11 +289,6 @@ class FieldsBetween:
         self._many = max(1, len(request.observation))
         self._wavenumbers = np.repeat(np.tile(request.wavenumbers, len(request.problems)), widths)
 
-    @property
-    def body(self) -> Surface:
-        """Body of the flow."""
-        return self.flow.body
-
     def __call__(self, incidences: FloatArray) -> Arrays:
         """Arrays of results of unit directions (n, 3)."""
         incidences = np.asarray(incidences, dtype=float)
@@ -360,16 +307,17 @@ class FieldsBetween:
         number, places = self._lattice.located(incidences, level)
         own, which = np.unique(number, return_inverse=True)
         members = np.split(np.argsort(which, kind="stable"), np.cumsum(np.bincount(which))[:-1])
-        cells = nodes.cells(level, own)
+        stencils, chains = nodes.cells(level, own)
         six, errors = weights(places)
-        stencil = cells.stencil[which]
+        stencil = stencils[which]
         lengths = nodes.results["line_length"][stencil].T
-        length, *off = (totals(w.T * lengths) for w in (six, *errors))
+        # nodes are added one after the other: an incidence has the same in whatever company
+        length, *off = (np.asarray(sum(w.T * lengths)) for w in (six, *errors))
         # of a line that is not there it is not known
         passed = np.max(np.abs(off), axis=0) <= self._accuracy * length
         shape = len(rows), self._many, 2, len(self._wavenumbers)
         fields, differences = np.zeros(shape, dtype=complex), np.zeros(shape)
-        for chain, mine in zip(cells.chains, members, strict=True):
+        for chain, mine in zip(chains, members, strict=True):
             if chain is None:
                 passed[mine] = False
             else:
@@ -378,25 +326,11 @@ class FieldsBetween:
         inside = stencil[:, BASE : BASE + 2]
         problems = list(self._problems(nodes.results, inside, fields, differences))
         if self.request.method == "auto":
-            for problem in problems:
-                passed[FieldArrays(problem.arrays).unclear] = False
-        self._write(nodes.results, inside, places, length, problems, rows, passed, out)
-        return np.asarray(passed)
-
-    def _write(
-        self,
-        results: Arrays,
-        inside: IntArray,
-        places: FloatArray,
-        length: FloatArray,
-        problems: list[Problem],
-        rows: IntArray,
-        passed: BoolArray,
-        out: Arrays,
-    ) -> None:
-        """Results of the rows (n,) that have passed, from the corners of their cells (n, 2) and the sums."""
+            for _, _, arrays in problems:
+                passed[FieldArrays(arrays).unclear] = False
+        # of those that have passed, from the corners of their cells and the sums
         done, some = np.flatnonzero(passed), rows[passed]
-        known = {name: results[name][inside[done]] for name in (*LINE, *VALID)}
+        known = {name: nodes.results[name][inside[done]] for name in (*LINE, *VALID)}
         out["incidence_status"][some] = np.where(np.any(known["incidence_status"] == FOLLOWED, axis=1), FOLLOWED, OK)
         out["curves"][some], out["line_length"][some] = known["curves"][:, 0], length[done]
         out["line_error"][some] = known["line_error"].max(axis=1)
@@ -407,12 +341,13 @@ class FieldsBetween:
         for name, worst in zip(VALID, (np.min, np.max), strict=True):
             out[name][some] = worst(known[name], axis=1)
         out["interpolated"][some] = True
-        for problem in problems:
-            at: Any = (some, *problem.which)
-            for name, values in (problem.arrays | {"interpolation_error": problem.difference}).items():
-                if name + problem.suffix in out:
+        for numbers, suffix, arrays in problems:
+            at: Any = (some, *numbers)
+            for name, values in arrays.items():
+                if name + suffix in out:
                     # one observer is no axis of "monostatic"
-                    out[name + problem.suffix][at] = values[done] if self.request.observation else values[done, 0]
+                    out[name + suffix][at] = values[done] if self.request.observation else values[done, 0]
+        return np.asarray(passed)
 
     def _summed(
         self, nodes: Nodes, chain: IntArray, six: FloatArray, errors: FloatArray
@@ -427,11 +362,17 @@ class FieldsBetween:
         # of a conductor's components together
         squares, sizes = (np.add.reduceat(each, self._first, axis=-1) for each in (squares, sizes))
         whole = squares[:, :, 0] + squares[:, :, 1] <= self._accuracy**2 * (sizes[:, :, 0] + sizes[:, :, 1])
-        creeping = squares[:, :, 1] <= (OF_CREEPING * self._accuracy) ** 2 * sizes[:, :, 1]
+        # the creeping part may err by ten times as much of its own size
+        creeping = squares[:, :, 1] <= (10.0 * self._accuracy) ** 2 * sizes[:, :, 1]
         return fields, np.asarray(differences), np.all(whole & creeping, axis=(1, 2))
 
-    def _problems(self, results: Arrays, inside: IntArray, fields: Any, differences: FloatArray) -> Iterator[Problem]:
-        """What was summed, by boundary and wavenumber, with the errors and flags of the corners."""
+    def _problems(
+        self, results: Arrays, inside: IntArray, fields: Any, differences: FloatArray
+    ) -> Iterator[tuple[tuple[int, ...], str, Arrays]]:
+        """What was summed, by boundary and wavenumber, with the errors and flags of the corners.
+
+        Each with its place in arrays of results, after the incidence, and the suffix of their names.
+        """
         request, n = self.request, len(fields)
         numbers = [(*which, k) for _, which, _ in request.problems for k in range(len(request.wavenumbers))]
         suffixes = np.repeat([suffix for _, _, suffix in request.problems], len(request.wavenumbers))
@@ -441,9 +382,17 @@ class FieldsBetween:
             reflected, creeping = (fields[:, :, part, first:last].reshape(shape) for part in (0, 1))
             difference = (differences[:, :, 0, first:last] + differences[:, :, 1, first:last]).reshape(shape)
             error, unresolved = (results[name + suffix][(inside, *which)] for name in ("error", "unresolved"))
-            arrays = {"total": reflected + creeping, "creeping": creeping, "reflected": reflected}
-            arrays["forward"] = np.zeros(shape, dtype=complex)
-            arrays["error"] = np.hypot(error.max(axis=1).reshape(shape), difference)
-            arrays["unresolved"] = unresolved.any(axis=1).reshape(n, self._many)
-            arrays["by_currents"] = np.zeros((n, self._many), dtype=bool)
-            yield Problem(which, suffix, difference, arrays)
+            yield (
+                which,
+                suffix,
+                {
+                    "total": reflected + creeping,
+                    "creeping": creeping,
+                    "reflected": reflected,
+                    "forward": np.zeros(shape, dtype=complex),
+                    "error": np.hypot(error.max(axis=1).reshape(shape), difference),
+                    "interpolation_error": difference,
+                    "unresolved": unresolved.any(axis=1).reshape(n, self._many),
+                    "by_currents": np.zeros((n, self._many), dtype=bool),
+                },
+            )

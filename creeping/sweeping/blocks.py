@@ -33,9 +33,6 @@ if TYPE_CHECKING:
 TASK = 32
 """Values of one task: of some 0.1 s each where currents serve, so that a few seconds of work are lost at most."""
 
-SHARE = 10.0
-"""Seconds between reports of what is there, over what making the last one took."""
-
 
 class Rows(NamedTuple):
     """A dataset in which some values are not computed yet, and which are: (incidences, wavenumbers)."""
@@ -49,7 +46,7 @@ Told = Callable[[Rows], None]
 
 def begun(store: str | Path) -> SweepStore | None:
     """The first block of a folder, if it has begun: its flow is that of all, and so are the sizes, see `sizes_of`."""
-    first = Path(store) / _name(0)
+    first = Path(store) / "0000"
     return SweepStore.open(first) if first.exists() else None
 
 
@@ -97,7 +94,8 @@ def sweep_blocks(
     def show(last: bool = False) -> None:
         nonlocal shown, took
         begun = time.perf_counter()
-        if rows is None or not (last or begun - shown >= max(EVERY, SHARE * took)):
+        # and not before ten times what making the last one took
+        if rows is None or not (last or begun - shown >= max(EVERY, 10 * took)):
             return
         if (found := _so_far(done, Path(store), blocks)) is not None:
             rows(found)
@@ -115,7 +113,7 @@ def sweep_blocks(
 
     try:
         for number, block in enumerate(blocks):
-            place = Path(store) / _name(number)
+            place = Path(store) / f"{number:04d}"
             options: dict[str, Any] = asked | {"chunk": chunk, "progress": told, "resume": resume, "store": place}
             sweep_directions(flow, incidences, wavenumbers=block, **options)
             done.append(SweepStore.open(place).dataset(loaded=True))
@@ -152,13 +150,9 @@ def sizes_of(
     return (all_k, max(1, task // all_k)) if values >= TASK and count > 1 else (max(1, task // values), count)
 
 
-def _name(number: int) -> str:
-    return f"{number:04d}"
-
-
 def _so_far(done: list[xarray.Dataset], store: Path, blocks: list[FloatArray]) -> Rows | None:
     """What the blocks of a folder hold that are done, and the next one; nothing if there is none yet."""
-    parts, place = list(done), store / _name(len(done))
+    parts, place = list(done), store / f"{len(done):04d}"
     if len(parts) < len(blocks) and place.exists():
         parts.append(SweepStore.open(place).dataset(loaded=True))
     if not parts:

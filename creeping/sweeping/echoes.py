@@ -168,28 +168,19 @@ def bistatic(
     return _swept(body, -radar[None], wavenumbers, asked, angles, cache, progress, (store, resume, rows))
 
 
-def seconds_of_currents(
-    body: Surface,
-    wavenumbers: FloatArray,
-    azimuths: FloatArray,
-    elevations: FloatArray,
-    *,
-    observers: int = 1,
-    boundary: BoundaryLike = "soft",
-) -> float:
+def seconds_of_currents(body: Surface, k: FloatArray, radar: Any, *, observers: int, boundary: BoundaryLike) -> float:
     """About what an echo costs where currents serve all of its incidences, by the first of them; 0 of unknown cost.
 
-    ``azimuths``, ``elevations`` (n,), degrees, are the radar's; ``observers`` directions belong to each.
+    ``radar``: azimuths and elevations (n,), degrees; ``observers`` directions belong to each.
     """
     if is_piecewise(body) or why_no_rays(body):
         return 0.0
-    radar = directions_from_azimuth_elevation(np.radians(azimuths[0]), np.radians(elevations[0]))
     try:
-        line = shadow_line(body, -radar)
+        line = shadow_line(body, -directions_from_azimuth_elevation(*(np.radians(angles[0]) for angles in radar)))
     except SingularIncidenceError:
         return 0.0
     fan = launch(DirectFlow(body, rtol=1e-6), line, length=size(body), n_rays=8, measured=False)
-    return len(azimuths) * expected_seconds(fan, wavenumbers, observers, boundary)
+    return len(radar[0]) * expected_seconds(fan, k, observers, boundary)
 
 
 def monostatic_method(body: Surface, wavenumbers: FloatArray, boundary: BoundaryLike, incidences: int) -> str:

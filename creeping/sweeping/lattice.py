@@ -23,13 +23,7 @@ FINER = 2
 """Steps of a level in one of the level before."""
 CROWDED = 3.0
 """Incidences for each node of a level for it to pay: a node costs 1.6 incidences, an interpolated one 0.15."""
-ENDS = 5
-"""Nodes of a stencil beyond its cell's own."""
 MOST_LEVELS = 6
-FLAT = 1e-9
-"""Largest distance of the directions of a cut from its plane."""
-HIGHEST = 0.999
-"""Largest height of a cut: a narrower one is no circle worth the name."""
 Vector = tuple[float, float, float]
 
 
@@ -90,7 +84,9 @@ def lattice_of(directions: FloatArray) -> Lattice | None:
     >>> lattice_of(cut).levels, lattice_of(cut[::40])
     (4, None)
     """
-    if len(directions) < CROWDED * (1 + ENDS):
+    # nodes of a stencil beyond its cell's own
+    ends = 5
+    if len(directions) < CROWDED * (1 + ends):
         return None
     normal = np.linalg.svd(directions - directions.mean(axis=0), full_matrices=False)[2][2]
     # digits that another machine has too, and one of both signs
@@ -98,13 +94,14 @@ def lattice_of(directions: FloatArray) -> Lattice | None:
     normal /= np.linalg.norm(normal)
     heights = directions @ normal
     height = float(np.round(heights.mean(), 12))
-    if np.max(np.abs(heights - height)) > FLAT or abs(height) > HIGHEST:
+    # in a plane to rounding, and not so high that it is no circle worth the name
+    if np.max(np.abs(heights - height)) > 1e-9 or abs(height) > 0.999:
         return None
     first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
     first /= np.linalg.norm(first)
     axes = [(float(x), float(y), float(z)) for x, y, z in (normal, first, np.cross(normal, first))]
     whole = Lattice((axes[0], axes[1], axes[2]), height, MOST_LEVELS)
     cells = [len(np.unique(whole.located(directions, level)[0])) for level in range(MOST_LEVELS)]
-    pays = [len(directions) >= CROWDED * (count + ENDS) for count in cells]
+    pays = [len(directions) >= CROWDED * (count + ends) for count in cells]
     levels = pays.index(False) if False in pays else MOST_LEVELS
     return Lattice(whole.axes, height, levels) if levels else None

@@ -19,15 +19,9 @@ from creeping.errors import CreepingError
 from creeping.geometry.checks import unit_of
 from creeping.storage.atomic import bytes_of, written_aside
 from creeping.storage.folder import content_digest
+from creeping.sweeping import results
 from creeping.sweeping.plan import SweepPlan
-from creeping.sweeping.results import (
-    MISSING,
-    coordinates,
-    count_attributes,
-    require,
-    sweep_attributes,
-    variable_attributes,
-)
+from creeping.sweeping.results import MISSING, require
 
 SCHEMA = 3
 ROOT, STUDY = "zarr.json", "study"
@@ -70,25 +64,32 @@ def write_empty(folder: Path, plan: SweepPlan, unit: str | None = None) -> dict[
 
     Lengths are called ``unit``, by default as the body knows it.
     """
-    zarr = require("zarr")
-    group = zarr.open_group(folder, mode="w", zarr_format=3)
+    group = require("zarr").open_group(folder, mode="w", zarr_format=3)
+    from zarr.codecs import Crc32cCodec, ZstdCodec
+
+    codecs = [ZstdCodec(level=1), Crc32cCodec()]
+
+    def create(name: str, shape: Any, dtype: Any, dims: Any, words: Any, first: int, **fill: Any) -> Any:
+        """Array with chunks that are whole but along the first axis."""
+        options = {"chunks": (min(first, shape[0]), *shape[1:]), "compressors": codecs, "attributes": words} | fill
+        return group.create_array(name, shape=shape, dtype=dtype, dimension_names=dims, **options)
+
     request, count, unit = plan.request, len(plan.incidences), unit or unit_of(plan.body)
-    beside = coordinates(request, plan.incidences, unit)
+    beside = results.coordinates(request, plan.incidences, unit)
     for name, (dims, values, words) in beside.items():
         text = values.dtype.kind == "U"
-        kind = str if text else values.dtype
-        where = _create(group, name, values.shape, kind, dims, words, first=values.shape[0], fill=None)
+        where = create(name, values.shape, str if text else values.dtype, dims, words, values.shape[0])
         where[:] = values.astype(object) if text else values
     for name, variable in request.variables.items():
         shape = (count, *(request.sizes[d] for d in variable.dims))
-        words, dims = variable_attributes(request, name, unit), ("incidence", *variable.dims)
-        _create(group, name, shape, variable.dtype, dims, words, first=plan.chunk, fill=variable.fill)
+        words, dims = results.variable_attributes(request, name, unit), ("incidence", *variable.dims)
+        create(name, shape, variable.dtype, dims, words, plan.chunk, fill_value=variable.fill)
     words = {"description": "0 missing, 1 done, 2 done but for failed incidences; written last"}
-    _create(group, STATUS, (plan.tasks,), "int8", ("task",), words, first=1, fill=int(TaskStatus.UNDONE))
+    create(STATUS, (plan.tasks,), "int8", ("task",), words, 1, fill_value=int(TaskStatus.UNDONE))
     words = {"description": "why an incidence failed, UTF-8, zeros after it"}
-    _create(group, ERRORS, (count, ERROR_BYTES), "uint8", ("incidence", "character"), words, first=plan.chunk, fill=0)
-    attributes = sweep_attributes(plan, unit)
-    write_root(folder, attributes | count_attributes(np.full(count, MISSING), []), list(beside))
+    create(ERRORS, (count, ERROR_BYTES), "uint8", ("incidence", "character"), words, plan.chunk, fill_value=0)
+    attributes = results.sweep_attributes(plan, unit)
+    write_root(folder, attributes | results.count_attributes(np.full(count, MISSING), []), list(beside))
     return {
         "schema": SCHEMA,
         "key": plan.key,
@@ -98,32 +99,6 @@ def write_empty(folder: Path, plan: SweepPlan, unit: str | None = None) -> dict[
         "attributes": attributes,
         "unchanging": unchanging_digest(folder, list(request.variables), list(beside)),
     }
-
-
-def _create(
-    group: Any,
-    name: str,
-    shape: tuple[int, ...],
-    dtype: Any,
-    dims: Any,
-    words: dict[str, Any],
-    *,
-    first: int,
-    fill: Any,
-) -> Any:
-    """Array with chunks that are whole but along the first axis."""
-    from zarr.codecs import Crc32cCodec, ZstdCodec
-
-    return group.create_array(
-        name,
-        shape=shape,
-        dtype=dtype,
-        chunks=(min(first, shape[0]), *shape[1:]),
-        dimension_names=dims,
-        attributes=words,
-        compressors=[ZstdCodec(level=1), Crc32cCodec()],
-        **({} if fill is None else {"fill_value": fill}),
-    )
 
 
 def write_root(folder: Path, attributes: dict[str, Any], beside: list[str]) -> None:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from creeping._progress import reporting
-from creeping._typing import Any, ArrayLike
+from creeping._typing import Any, ArrayLike, FloatArray
 from creeping._version import __version__
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked
@@ -162,20 +162,13 @@ def averages_of(body: Surface, boundary: BoundaryLike, rows: list[tuple[float, A
         "target_strength": ("dB re 1 L", "10 log10(backscattering/4 pi)"),
         "target_strength_error": ("dB", "error of the target strength"),
     }
-    variables = {
-        name: (
-            "wavenumber",
-            np.array([getattr(found, name) for _, found in rows]),
-            {"units": in_unit(units, unit), "description": text},
-        )
-        for name, (units, text) in words.items()
-    }
-    k = np.array([k for k, _ in rows])
-    coordinates = {"wavenumber": ("wavenumber", k, {"units": in_unit("1/L", unit), "description": "k"})}
-    attributes = {
-        "body": " ".join(repr(body).split()),
-        "boundary": boundary_name(boundary),
-        "creeping_version": __version__,
-    }
+
+    def column(values: list[float], units: str, text: str) -> tuple[str, FloatArray, dict[str, str]]:
+        return "wavenumber", np.array(values), {"units": in_unit(units, unit), "description": text}
+
+    variables = {name: column([getattr(found, name) for _, found in rows], *of) for name, of in words.items()}
+    coordinates = {"wavenumber": column([k for k, _ in rows], "1/L", "k")}
+    attributes = {"body": " ".join(repr(body).split()), "boundary": boundary_name(boundary)}
+    attributes["creeping_version"] = __version__
     dataset: xarray.Dataset = library.Dataset(variables, coordinates, attributes)
     return dataset

@@ -10,7 +10,6 @@ from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from math import prod
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -28,34 +27,14 @@ from creeping.shadow.status import FAILED
 from creeping.storage.folder import content_digest
 from creeping.sweeping.between import FieldsBetween
 from creeping.sweeping.request import SweepRequest
-from creeping.sweeping.sweeper import NoFlow, Passed, Sweeper
+from creeping.sweeping.sweeper import NoFlow, Sweeper
 
-MOST_IN_TASK, MOST_AT_ONCE = 1024, 256
-"""Incidences of a task, and of one that nobody else waits for."""
-TASK_BYTES = 64_000_000
-"""Results of one task, in memory."""
-INCIDENCE_BYTES = 1_000_000_000
-"""Results of one incidence, which is computed whole and is a chunk of its own at least."""
 MISTAKES = (MemoryError, TypeError, AttributeError, NameError, ImportError)
 """Errors that tell of the program or the machine, not of an incidence."""
 Arrays = dict[str, np.ndarray[Any, Any]]
 
 
-class Computing(Protocol):
-    """What gives the results of unit directions (n, 3), as `Sweeper` does."""
-
-    passed: Passed
-    store: Path | None
-
-    @property
-    def request(self) -> SweepRequest:
-        """What is computed."""
-
-    def __call__(self, incidences: FloatArray) -> Arrays:
-        """Arrays whose first axis is the incidence."""
-
-
-Maker = Callable[[Flow, SweepRequest], Computing]
+Maker = Callable[[Flow, SweepRequest], Sweeper | FieldsBetween]
 
 
 def sweeper_of(flow: Flow, request: SweepRequest) -> Sweeper | FieldsBetween:
@@ -143,31 +122,28 @@ def task_size(request: SweepRequest, count: int, asked: int | None = None, *, sh
     """Incidences of a task unless asked for: not too large in memory, and ``shared`` enough of them to save often."""
     if asked:
         return min(int(asked), count)
-    most = -(-count // 32) if shared else min(count, MOST_AT_ONCE)
-    # memory that the next task takes again costs less than new memory
-    return int(np.clip(min(most, TASK_BYTES // bytes_of(request)), 1, MOST_IN_TASK))
+    most = -(-count // 32) if shared else min(count, 256)
+    # 64 MB of results: memory that the next task takes again costs less than new memory
+    return int(np.clip(min(most, 64_000_000 // bytes_of(request)), 1, 1024))
 
 
 def bytes_of(request: SweepRequest) -> int:
     """Results of one incidence, in memory."""
     sizes = request.sizes
-    counts = (np.dtype(v.dtype).itemsize * prod(sizes[d] for d in v.dims) for v in request.variables.values())
-    return sum(counts)
+    return sum(np.dtype(v.dtype).itemsize * prod(sizes[d] for d in v.dims) for v in request.variables.values())
 
 
 def too_large(request: SweepRequest) -> str:
     """Why the results of one incidence are too many; nothing if they are not."""
     size = bytes_of(request)
-    if size <= INCIDENCE_BYTES:
+    # an incidence is computed whole and is a chunk of its own at least
+    if size <= 1e9:
         return ""
     fewer = "rays or steps" if request.quantity == "rays" else "wavenumbers, boundaries or directions of observation"
-    return (
-        f"one incidence gives {size / 1e9:.1f} GB of results, more than {INCIDENCE_BYTES / 1e9:g} GB; ask for fewer "
-        f"{fewer}"
-    )
+    return f"one incidence gives {size / 1e9:.1f} GB of results, more than 1 GB; ask for fewer {fewer}"
 
 
-def compute(sweeper: Computing, incidences: FloatArray) -> tuple[Arrays, dict[int, str]]:
+def compute(sweeper: Sweeper | FieldsBetween, incidences: FloatArray) -> tuple[Arrays, dict[int, str]]:
     """Results of incidences (n, 3), and the errors of those that failed, by row.
 
     If the sweeper raises, each incidence is tried alone, so that one does not cost the others their results. `MISTAKES`

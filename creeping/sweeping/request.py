@@ -6,7 +6,7 @@ the wave came from, "bistatic" that in given directions. Results are arrays whos
 
 import sys
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -24,10 +24,8 @@ from creeping.shadow.status import FAILED, INCIDENCE_STATUSES
 from creeping.sweeping.lattice import Lattice, lattice_of
 
 Quantity = Literal["rays", "monostatic", "bistatic"]
-QUANTITIES: tuple[Quantity, ...] = ("rays", "monostatic", "bistatic")
+QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 METHODS = ("rays", "auto", "currents", "equation", "t-matrix")
-LONG_LEAP = 0.15
-"""Share of an automatic length up to which it is made one of whole leaps."""
 MOST_RAYS, MOST_STEPS, MOST_WAVENUMBERS = 65_536, 4096, 100_000
 SHARES = ("attached", "occluded", "concave")
 AMPLITUDES = {
@@ -140,17 +138,14 @@ class SweepRequest:
         if not isinstance(self.quantity, str) or self.quantity not in QUANTITIES:
             yield f"quantity = {self.quantity!r} is none of {', '.join(QUANTITIES)}"
             return
-        number = isinstance(self.length, (int, float)) and not isinstance(self.length, bool)
-        # of a whole number that is no float numpy knows nothing
-        if not (number and 0 < self.length <= sys.float_info.max):
+        if not _is_length(self.length):
             yield f"length = {self.length!r} is not a positive finite number"
         for name, most in (("n_rays", MOST_RAYS), ("n_steps", MOST_STEPS)):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
                 yield f"{name} = {value!r} is not a whole number from 1 to {most}"
         if self.accuracy is not None:
-            number = isinstance(self.accuracy, float) and 0 < self.accuracy < 1
-            if not number:
+            if not (isinstance(self.accuracy, float) and 0 < self.accuracy < 1):
                 yield f"accuracy = {self.accuracy!r} is not a number between 0 and 1"
             elif self.method in ("currents", "equation", "t-matrix"):
                 yield f'accuracy goes with rays; method "{self.method}" computes every incidence'
@@ -341,10 +336,15 @@ def sweep_length(body: Surface, length: float | Literal["auto"], wavenumbers: Ar
     if why_no_rays(body):
         return 1.0
     if not (isinstance(length, str) and length == AUTO):
-        number = isinstance(length, (int, float)) and not isinstance(length, bool) and 0 < length <= sys.float_info.max
-        return asked_length(body, float(length)) if number else length
+        return asked_length(body, float(length)) if _is_length(length) else length
     found = body_length(body, None if speed_of(body) is not None or not known.size else float(known.min()))
-    return leap * float(np.ceil(found / leap - 1e-9)) if 0 < leap < LONG_LEAP * found else found
+    # not of leaps that would lengthen it by 15 % or more
+    return leap * float(np.ceil(found / leap - 1e-9)) if 0 < leap < 0.15 * found else found
+
+
+def _is_length(value: Any) -> bool:
+    # of a whole number that is no float numpy knows nothing
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and 0 < value <= sys.float_info.max
 
 
 def _plain(value: Any) -> Any:

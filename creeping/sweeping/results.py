@@ -65,15 +65,12 @@ def in_unit(units: str, unit: str) -> str:
 def coordinates(request: SweepRequest, incidences: FloatArray, unit: str) -> dict[str, Coordinate]:
     """Coordinates by name, lengths in ``unit``: dimensions, values, attributes."""
     theta, phi = angles_of(incidences)
-    sphere = {
-        "theta": ("angle of the direction from z", theta),
-        "phi": ("angle of the direction about z, from x towards y", phi),
-    }
+    about = "angle of the direction about z, from x towards y"
     found: dict[str, Coordinate] = {
-        "direction": (("incidence", "axis"), incidences, {"units": "1", "description": "where the wave travels"})
+        "direction": (("incidence", "axis"), incidences, {"units": "1", "description": "where the wave travels"}),
+        "theta": (("incidence",), theta, {"units": "rad", "description": "angle of the direction from z"}),
+        "phi": (("incidence",), phi, {"units": "rad", "description": about}),
     }
-    for name, (text, values) in sphere.items():
-        found[name] = (("incidence",), values, {"units": "rad", "description": text})
     if request.quantity == "rays":
         times = {"units": unit, "description": "travel time of the outputs; time for a weighted body"}
         found["travel_time"] = (("step",), request.travel_times, times)
@@ -165,8 +162,7 @@ def as_dataset(plan: SweepPlan, arrays: Arrays, errors: list[tuple[int, str]]) -
         name: (("incidence", *variable.dims), arrays[name], variable_attributes(request, name, unit))
         for name, variable in request.variables.items()
     }
-    counts = count_attributes(arrays["incidence_status"], errors)
-    words = sweep_attributes(plan, unit) | counts
+    words = sweep_attributes(plan, unit) | count_attributes(arrays["incidence_status"], errors)
     found: xarray.Dataset = register().Dataset(variables, coordinates(request, plan.incidences, unit), words)
     return found
 
@@ -179,10 +175,8 @@ def without_complex(dataset: "xarray.Dataset") -> "xarray.Dataset":
     changed = dataset
     for name, values in dataset.data_vars.items():
         if values.dtype.kind == "c":
-            parts = {f"{name}_real": values.real, f"{name}_imag": values.imag}
-            changed = changed.drop_vars(name).assign(
-                {key: part.assign_attrs(values.attrs) for key, part in parts.items()}
-            )
+            parts = {f"{name}_{part}": getattr(values, part).assign_attrs(values.attrs) for part in ("real", "imag")}
+            changed = changed.drop_vars(name).assign(parts)
     return changed
 
 
@@ -220,7 +214,9 @@ class SweepFields:
         """The same of the conductor alone."""
         names = [str(name) for name in self.dataset.data_vars if str(name).endswith("_pec")]
         if not names:
-            raise InvalidInputError("the sweep has no conductor; its boundaries are " + self._boundaries)
+            raise InvalidInputError(
+                f"the sweep has no conductor; its boundaries are {self.dataset.attrs.get('boundaries')}"
+            )
         scalar = [name.removesuffix("_pec") for name in names]
         plain = self.dataset.drop_vars([name for name in scalar if name in self.dataset])
         return SweepFields(plain.rename(dict(zip(names, scalar, strict=True))))
@@ -267,10 +263,6 @@ class SweepFields:
         scattered, incident = POLARISATIONS[name]
         return SweepFields(self.pec.dataset.sel(scattered=scattered, incident=incident))
 
-    @property
-    def _boundaries(self) -> str:
-        return str(self.dataset.attrs.get("boundaries", "none"))
-
     def _decibels(self, values: "xarray.DataArray", factor: float, units: str, text: str) -> "xarray.DataArray":
         with np.errstate(divide="ignore"):
             found = 10 * np.log10(factor * abs(values) ** 2)
@@ -280,7 +272,7 @@ class SweepFields:
 
 def register() -> Any:
     """Make ``dataset.field`` known to xarray, once, and return xarray."""
-    xarray = required("xarray", use="sweeps need", extra="sweep")
+    xarray = require("xarray")
     if not hasattr(xarray.Dataset, "field"):
         xarray.register_dataset_accessor("field")(SweepFields)
     return xarray

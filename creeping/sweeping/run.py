@@ -32,12 +32,9 @@ from creeping.sweeping.sweeper import NoFlow
 if TYPE_CHECKING:
     import xarray
 
-IN_MEMORY = 8_000_000_000
-"""Bytes of results beyond which a store is asked for."""
+
 EVERY = 1.0
 """Seconds between reports within a task."""
-
-
 Progress = Callable[[float, int, float], None]
 """Called with incidences done, incidences to do, and seconds."""
 
@@ -146,8 +143,7 @@ def sweep_directions(
     flow = cast(Flow, flow)
     if not isinstance(flow, NoFlow):
         checked_flow(flow)
-    _checked_options(store, progress, resume)
-    _refuse(flow, quantity, store, resume, client)
+    _checked_options(flow, quantity, store, resume, client, progress)
     if boundary is None:
         boundary = () if quantity == "rays" else "soft"
     several: Any = list(boundary) if isinstance(boundary, (list, tuple)) else [boundary]
@@ -176,16 +172,13 @@ def sweep_directions(
     elif not isinstance(flow, NoFlow) and solved_alone(flow.body, request, len(unit)):
         flow = NoFlow(flow.body)
     leap = flow.horizon if isinstance(flow, PhaseMap) else 0.0
-    bare = isinstance(flow, NoFlow)
-    known = 1.0 if bare else sweep_length(flow.body, length, request.wavenumbers, leap=leap)
-    request = replace(request, length=known)
-    request = with_lattice(request, unit)
+    known = 1.0 if isinstance(flow, NoFlow) else sweep_length(flow.body, length, request.wavenumbers, leap=leap)
+    request = with_lattice(replace(request, length=known), unit)
     chunk = None if chunk is None else whole_number(chunk, "chunk")
-    chunk = (
-        SweepStore.open(str(store)).chunk
-        if going_on
-        else task_size(request, len(unit), chunk, shared=store is not None or client is not None)
-    )
+    if going_on:
+        chunk = begun.chunk
+    else:
+        chunk = task_size(request, len(unit), chunk, shared=store is not None or client is not None)
     plan = SweepPlan(flow, request, unit, chunk)
     with reporting(progress, "incidences") as told:
         if store is None:
@@ -205,7 +198,8 @@ def in_memory(plan: SweepPlan, progress: Progress | None = None) -> xarray.Datas
     """
     count = len(plan.incidences)
     size = float(bytes_of(plan.request) * count)
-    if size > IN_MEMORY:
+    # beyond 8 GB a store is asked for
+    if size > 8e9:
         raise InvalidInputError(f"{count} incidences give {size / 1e9:.0f} GB of results; give store=, a folder")
     # they are put together of tasks
     within_budget(2 * size, f"results of {count} incidences", "give store=, a folder, or ask for fewer", asked=count)
@@ -276,17 +270,17 @@ def open_store(
     InvalidInputError
         If the folder exists and ``resume`` is false, or holds another study.
     """
-    if resume and Path(folder).exists():
-        store = SweepStore.open(folder)
-        store.require_same(plan)
-        for text in store.mended(plan):
-            note(text)
-        return store
-    if Path(folder).exists():
+    if not Path(folder).exists():
+        return SweepStore.create(folder, plan)
+    if not resume:
         raise InvalidInputError(
             f"{folder} exists; give resume=True (--resume) to go on with it, or choose another store"
         )
-    return SweepStore.create(folder, plan)
+    store = SweepStore.open(folder)
+    store.require_same(plan)
+    for text in store.mended(plan):
+        note(text)
+    return store
 
 
 def fill(
@@ -328,8 +322,15 @@ def fill(
         left = len(missing)
         done = len(plan.incidences) - sum(plan.rows(t).stop - plan.rows(t).start for t in missing)
         told = _Told(progress, len(plan.incidences), done)
+        if client is not None and missing:
+            require("distributed")
+            from creeping.sweeping.cluster import fill_on
+
+            filled = fill_on(client, plan, store, missing, stop)
+        else:
+            filled = _filled(plan, store, missing[:most], told, stop)
         try:
-            for task in _filled(plan, store, missing, told, client, stop, most):
+            for task in filled:
                 left -= 1
                 told.add(plan.rows(task))
         except BaseException:
@@ -342,44 +343,27 @@ def fill(
 
 
 def _filled(
-    plan: SweepPlan,
-    store: SweepStore,
-    missing: list[int],
-    told: _Told,
-    client: Any,
-    stop: Callable[[], bool],
-    most: int | None,
+    plan: SweepPlan, store: SweepStore, tasks: list[int], told: _Told, stop: Callable[[], bool]
 ) -> Iterator[int]:
-    """Compute tasks here or on a cluster; yields each when it is committed."""
-    if client is not None and missing:
-        require("distributed")
-        from creeping.sweeping.cluster import fill_on
-
-        yield from fill_on(client, plan, store, missing, stop)
-    elif missing:
-        for task, arrays, errors in _computed(plan, missing[:most], told, stop, store):
-            store.write_task(task, arrays, errors)
-            store.commit(task, failures=bool(errors))
-            yield task
+    """Compute tasks in this process; yields each when it is committed."""
+    for task, arrays, errors in _computed(plan, tasks, told, stop, store) if tasks else ():
+        store.write_task(task, arrays, errors)
+        store.commit(task, failures=bool(errors))
+        yield task
 
 
-def _checked_options(store: Any, progress: Any, resume: Any) -> None:
-    """Refuse options that are of no kind that can be meant."""
+def _checked_options(flow: Flow, quantity: str, store: Any, resume: Any, client: Any, progress: Any) -> None:
+    """Refuse options that are of no kind that can be meant, or do not go together."""
     flag(resume, "resume")
     if store is not None:
         folder_path(store, "store")
     if not (progress is None or isinstance(progress, bool) or callable(progress)):
         raise InvalidInputError(f"progress = {shown(progress)} cannot be called; give True or a function of 3 numbers")
 
-
-def _refuse(flow: Flow, quantity: str, store: Any, resume: bool, client: Any) -> None:
-    """Refuse options that do not go together."""
     if isinstance(quantity, str) and quantity != "rays" and getattr(flow.body, "speed", None) is not None:
         raise InvalidInputError(
             f"quantity {quantity!r} is for rays of constant speed; leave out the speed, or ask for 'rays'"
         )
     if store is None and (resume or client is not None):
-        word = "resume" if resume else "client"
-        raise InvalidInputError(
-            f"{word} goes with store=, the folder of the results" + (", seen by all workers" * (not resume))
-        )
+        word, more = ("resume", "") if resume else ("client", ", seen by all workers")
+        raise InvalidInputError(f"{word} goes with store=, the folder of the results{more}")

@@ -29,21 +29,8 @@ from creeping.rays.transport import Flow
 from creeping.shadow.status import FAILED
 from creeping.storage.atomic import bytes_of
 from creeping.storage.folder import content_digest
-from creeping.sweeping.layout import (
-    ERROR_BYTES,
-    ERRORS,
-    MOST_DOCUMENT,
-    ROOT,
-    SCHEMA,
-    STATUS,
-    STUDY,
-    TaskStatus,
-    aside_of,
-    unchanging_digest,
-    write_empty,
-    write_root,
-    write_study,
-)
+from creeping.sweeping import layout
+from creeping.sweeping.layout import ERRORS, STATUS, TaskStatus
 from creeping.sweeping.plan import Arrays, SweepPlan, differing, open_flow, save_flow
 from creeping.sweeping.results import MISSING, SHOWN, count_attributes, register, require
 
@@ -85,9 +72,9 @@ class SweepStore:
         folder = Path(folder).absolute()
         if folder.exists():
             raise InvalidInputError(f"{folder} exists; resume it, or choose another store")
-        with aside_of(folder) as aside:
-            write_study(aside, write_empty(aside, plan))
-            save_flow(plan.flow, aside / STUDY)
+        with layout.aside_of(folder) as aside:
+            layout.write_study(aside, layout.write_empty(aside, plan))
+            save_flow(plan.flow, aside / layout.STUDY)
             aside.rename(folder)
         return cls.open(folder)
 
@@ -102,9 +89,9 @@ class SweepStore:
         """
         require("zarr")
         folder = Path(folder).absolute()
-        file = folder / STUDY / ROOT
+        file = folder / layout.STUDY / layout.ROOT
         try:
-            attributes = json.loads(bytes_of(file, MOST_DOCUMENT))["attributes"]
+            attributes = json.loads(bytes_of(file, layout.MOST_DOCUMENT))["attributes"]
             content = attributes["content"]
             intact = attributes["blake2b"] == content_digest(content)
         except OSError as error:
@@ -113,8 +100,8 @@ class SweepStore:
             raise CreepingError(f"{file} is damaged ({error}); compute the sweep anew") from error
         if not intact:
             raise CreepingError(f"{file} is damaged: its digest differs; compute the sweep anew")
-        if content.get("schema") != SCHEMA:
-            raise CreepingError(f"{folder} has schema {content.get('schema')!r}, this version reads {SCHEMA}")
+        if content.get("schema") != layout.SCHEMA:
+            raise CreepingError(f"{folder} has schema {content.get('schema')!r}, this version reads {layout.SCHEMA}")
         return cls(folder, content)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -125,10 +112,13 @@ class SweepStore:
         """Incidences of a task."""
         return slice(task * self.chunk, min((task + 1) * self.chunk, self.count))
 
+    def _place(self, task: int) -> str:
+        return f"task {task} (incidences {self.rows(task).start} to {self.rows(task).stop - 1})"
+
     @property
     def matrices(self) -> Path:
         """Folder of the T-matrices that its fields are made of."""
-        return self.folder / STUDY / "t-matrices"
+        return self.folder / layout.STUDY / "t-matrices"
 
     def flow(self, body: Surface) -> Flow:
         """Flow that the sweep was begun with.
@@ -139,7 +129,7 @@ class SweepStore:
             If it is of another body, damaged, or of no known kind.
         """
         try:
-            return open_flow(self.key["flow"], self.folder / STUDY, body)
+            return open_flow(self.key["flow"], self.folder / layout.STUDY, body)
         except KeyError as error:
             raise CreepingError(f"{self.folder} lacks {error} of its flow; compute the sweep anew") from error
 
@@ -172,7 +162,7 @@ class SweepStore:
         from filelock import FileLock, Timeout
 
         if self._lock is None:
-            self._lock = FileLock(self.folder / STUDY / ".lock", timeout=0)
+            self._lock = FileLock(self.folder / layout.STUDY / ".lock", timeout=0)
         try:
             self._lock.acquire()
         except Timeout as error:
@@ -228,9 +218,9 @@ class SweepStore:
                 raise CreepingError(f"the sweeper gave {name} of shape {arrays[name].shape}, not {expected}: a mistake")
             self.put(name, rows, arrays[name])
         if errors:
-            texts = np.zeros((rows.stop - rows.start, ERROR_BYTES), dtype=np.uint8)
+            texts = np.zeros((rows.stop - rows.start, layout.ERROR_BYTES), dtype=np.uint8)
             for row, text in errors.items():
-                raw = text.encode()[:ERROR_BYTES]
+                raw = text.encode()[: layout.ERROR_BYTES]
                 texts[row, : len(raw)] = np.frombuffer(raw, dtype=np.uint8)
             self.put(ERRORS, rows, texts)
 
@@ -244,17 +234,17 @@ class SweepStore:
             self.chunk_file(name, task).unlink(missing_ok=True)
         self.put(STATUS, slice(task, task + 1), TaskStatus.UNDONE)
 
-    def failures(self, most: int = SHOWN) -> list[tuple[int, str]]:
+    def failures(self) -> list[tuple[int, str]]:
         """The first incidences that failed, and why."""
         found: list[tuple[int, str]] = []
         for task in np.flatnonzero(self.status() == TaskStatus.WITH_FAILURES):
             first = self.rows(int(task)).start
             failed, texts = self.read("incidence_status", int(task)) == FAILED, self.read(ERRORS, int(task))
-            for row in np.flatnonzero(failed)[: most - len(found)]:
+            for row in np.flatnonzero(failed):
                 found.append((first + int(row), bytes(texts[row]).rstrip(b"\0").decode(errors="replace")))
-            if len(found) >= most:
+            if len(found) >= SHOWN:
                 break
-        return found
+        return found[:SHOWN]
 
     def verify(self, *, repair: bool = False) -> list[tuple[int, str]]:
         """Read every chunk of the tasks that are done.
@@ -290,13 +280,9 @@ class SweepStore:
         """Done tasks without all their chunks, and the first variable that they lack."""
         lost = {}
         for task, mark in enumerate(self.status()):
-            names = (
-                []
-                if mark == TaskStatus.UNDONE
-                else [*self.variables, *([ERRORS] if mark == TaskStatus.WITH_FAILURES else [])]
-            )
+            names = [*self.variables, ERRORS][: None if mark == TaskStatus.WITH_FAILURES else -1]
             name = next((name for name in names if not self._exists(name, task)), None)
-            if name is not None:
+            if mark != TaskStatus.UNDONE and name is not None:
                 lost[task] = name
         return lost
 
@@ -316,16 +302,15 @@ class SweepStore:
         lost = self.lost()
         if lost:
             task, name = next(iter(lost.items()))
-            rows = self.rows(task)
             raise CreepingError(
-                f"{name} of task {task} (incidences {rows.start} to {rows.stop - 1}) is missing in {self.folder} "
-                f"({len(lost)} such tasks); to compute it anew, resume",
+                f"{name} of {self._place(task)} is missing in {self.folder} ({len(lost)} such tasks); to compute it "
+                "anew, resume",
                 task=task,
             )
 
     def _is_described(self) -> bool:
         try:
-            found = unchanging_digest(self.folder, self.variables, self.content["coordinates"])
+            found = layout.unchanging_digest(self.folder, self.variables, self.content["coordinates"])
             return found == str(self.content["unchanging"])
         except OSError:
             return False
@@ -333,7 +318,7 @@ class SweepStore:
     def finish(self) -> None:
         """Write counts to the attributes of the folder, for other readers."""
         with self.writing():
-            write_root(self.folder, self._attributes(), self.content["coordinates"])
+            layout.write_root(self.folder, self._attributes(), self.content["coordinates"])
 
     def _attributes(self) -> dict[str, Any]:
         return {**self.content["attributes"], **count_attributes(self.incidence_status(), self.failures())}
@@ -398,7 +383,7 @@ class SweepStore:
         if name not in self._opened:
             zarr = require("zarr")
             # chunks of fill values too, so that one that is lost is missed
-            with self.reading(f"{name}/{ROOT}"), zarr.config.set({"array.write_empty_chunks": name != ERRORS}):
+            with self.reading(f"{name}/{layout.ROOT}"), zarr.config.set({"array.write_empty_chunks": name != ERRORS}):
                 self._opened[name] = zarr.open_array(self.folder / name, mode="r+", zarr_format=3)
         return self._opened[name]
 
@@ -427,10 +412,9 @@ class SweepStore:
         except CreepingError:
             raise
         except Exception as error:  # whatever zarr, its codecs and json make of damage
-            what = name if task is None else f"{name} of task {task}"
-            rows = "" if task is None else f" (incidences {self.rows(task).start} to {self.rows(task).stop - 1})"
+            what = name if task is None else f"{name} of {self._place(task)}"
             raise CreepingError(
-                f"{what}{rows} in {self.folder} is damaged ({error}); to compute damaged tasks anew, resume with "
+                f"{what} in {self.folder} is damaged ({error}); to compute damaged tasks anew, resume with "
                 "--verify, or after SweepStore.verify(repair=True)",
                 task=task,
             ) from error
@@ -456,8 +440,9 @@ class SweepStore:
         found = []
         with self.locked():
             if not self._is_described():
-                with aside_of(self.folder) as aside:
-                    if write_empty(aside, plan, self.content["unit"])["unchanging"] != self.content["unchanging"]:
+                with layout.aside_of(self.folder) as aside:
+                    anew = layout.write_empty(aside, plan, self.content["unit"])
+                    if anew["unchanging"] != self.content["unchanging"]:
                         raise CreepingError(
                             f"what describes arrays in {self.folder} is damaged, and this installation would write it "
                             "otherwise; compute the sweep anew"

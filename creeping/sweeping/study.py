@@ -13,19 +13,11 @@ from creeping.errors import InvalidInputError
 from creeping.geometry.surface import Surface, size, why_no_rays
 from creeping.rays.reach import AUTO
 from creeping.storage.atomic import text_of
+from creeping.sweeping import request as requests
 from creeping.sweeping.plan import too_large
-from creeping.sweeping.request import (
-    METHODS,
-    MOST_RAYS,
-    MOST_STEPS,
-    QUANTITIES,
-    SweepRequest,
-    sweep_length,
-    sweep_request,
-)
+from creeping.sweeping.request import SweepRequest, sweep_length
 from creeping.sweeping.study_tables import Key, count, nearest, one_of, read_directions, read_table
 
-MOST_BYTES = 100_000_000
 EXAMPLE = """\
 [study]
 name = "monostatic, twisted ellipsoid"
@@ -59,19 +51,19 @@ FILE = {
 """Options of a body from a file."""
 BODY = {
     "name": Key("any text", ""),
-    "body": Key("text", "", required=True),
+    "body": Key("text", required=True),
     "units": Key("text"),
     "speed": Key("text"),
 }
 TABLES: dict[str, dict[str, Key]] = {
     "study": {
-        "quantity": Key(one_of(*QUANTITIES), "monostatic"),
+        "quantity": Key(one_of(*requests.QUANTITIES), "monostatic"),
         "boundary": Key("texts"),
         "wavenumbers_per_length": Key("wavenumbers", ()),
-        "rays": Key(count(MOST_RAYS), 256),
-        "steps": Key(count(MOST_STEPS)),
+        "rays": Key(count(requests.MOST_RAYS), 256),
+        "steps": Key(count(requests.MOST_STEPS)),
         "order": Key(count(2)),
-        "method": Key(one_of(*METHODS)),
+        "method": Key(one_of(*requests.METHODS)),
         "accuracy": Key("positive"),
         "length": Key("length"),
         "length_in_body_sizes": Key("positive"),
@@ -141,7 +133,7 @@ def read_study(path: str | Path) -> Study:
     """
     path = Path(path)
     try:
-        text = text_of(path, MOST_BYTES)
+        text = text_of(path, 100_000_000)
     except FileNotFoundError as error:
         raise InvalidInputError(
             f"cannot read the study {path}: there is no such file; name another, or write one to start from with "
@@ -240,7 +232,7 @@ def _request(
         mistakes.append(f"the table [observation] {there}")
     boundary = ("soft",) * fields if main["boundary"] is None else main["boundary"]
     try:
-        request = sweep_request(
+        request = requests.sweep_request(
             quantity,
             length=1.0 if _length_in(main) == AUTO else main["length_in_body_sizes"] or main["length"],
             n_rays=main["rays"],

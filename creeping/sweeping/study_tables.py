@@ -11,25 +11,11 @@ import numpy as np
 
 from creeping._typing import Any, FloatArray
 from creeping.errors import CreepingError, InvalidInputError
-from creeping.geometry.directions import (
-    MOST,
-    direction_count,
-    directions_from_angles,
-    directions_from_azimuth_elevation,
-    fibonacci_directions,
-    great_circle,
-    lebedev_directions,
-    theta_phi_grid,
-    unit_directions,
-)
+from creeping.geometry import directions
+from creeping.geometry.directions import MOST
 from creeping.storage.atomic import text_of
 from creeping.sweeping.plan import short
 from creeping.sweeping.request import MOST_WAVENUMBERS
-
-WAVENUMBERS = (1e-12, 1e12)
-"""Whatever the unit of length, from nanometres to the size of the sun: the phase of a larger one has no digits left."""
-LINE_BYTES = 100
-"""Bytes of a line of three numbers in a file, at most."""
 
 
 class Kind(NamedTuple):
@@ -92,7 +78,8 @@ def _list_of(value: Any, test: Callable[[Any], bool]) -> bool:
 
 def _wavenumbers(value: Any) -> bool:
     def fits(one: Any) -> bool:
-        return _finite(one) and WAVENUMBERS[0] <= one <= WAVENUMBERS[1]
+        # whatever the unit of length, from nanometres to the size of the sun: the phase of a larger one has no digits
+        return _finite(one) and 1e-12 <= one <= 1e12
 
     if isinstance(value, dict):
         ends = all(fits(value.get(name)) for name in ("first", "last"))
@@ -119,7 +106,7 @@ VALUES = {
     "positive": Kind("a positive finite number", _positive, _plain),
     "length": Kind('a positive finite number or "auto"', lambda value: value == "auto" or _positive(value), _plain),
     "wavenumbers": Kind(
-        f"a positive number from {WAVENUMBERS[0]:g} to {WAVENUMBERS[1]:g}, a list of them, or "
+        "a positive number from 1e-12 to 1e+12, a list of them, or "
         f"{{ first = ..., last = ..., count = ... }} with a count up to {MOST_WAVENUMBERS}",
         _wavenumbers,
         _made_wavenumbers,
@@ -162,33 +149,39 @@ def nearest(word: str, known: Iterable[str]) -> str:
 def _ranges(first: str, second: str) -> dict[str, Key]:
     found: dict[str, Key] = {}
     for name in (first, second):
-        found |= {
-            f"{name}_deg_min": Key("number", 0.0, required=True),
-            f"{name}_deg_max": Key("number", 0.0, required=True),
-            f"{name}_count": Key(count(MOST), 1, required=True),
-        }
+        found |= {f"{name}_deg_{end}": Key("number", required=True) for end in ("min", "max")}
+        found[f"{name}_count"] = _COUNT
     return found
 
 
-KINDS: dict[str, dict[str, Key]] = {
-    "fibonacci": {"count": Key(count(MOST), 1, required=True)},
-    "lebedev": {"order": Key(count(MOST), 3, required=True)},
-    "grid": {
-        "theta_count": Key(count(MOST), 1, required=True),
-        "phi_count": Key(count(MOST), 1, required=True),
-    },
-    "theta-phi": _ranges("theta", "phi"),
-    "azimuth-elevation": _ranges("azimuth", "elevation"),
-    "great-circle": {
-        "first": Key("vector", required=True),
-        "through": Key("vector", required=True),
-        "count": Key(count(MOST), 1, required=True),
-        "angle_deg_min": Key("number", 0.0),
-        "angle_deg_max": Key("number", 360.0),
-    },
-    "list": {"directions": Key("vectors", required=True)},
-    "file": {"path": Key("text", "", required=True)},
+_COUNT = Key(count(MOST), required=True)
+KINDS: dict[str, tuple[dict[str, Key], Callable[[dict[str, Any], Path], FloatArray]]] = {
+    "fibonacci": ({"count": _COUNT}, lambda given, _: directions.fibonacci_directions(given["count"])),
+    "lebedev": ({"order": _COUNT}, lambda given, _: directions.lebedev_directions(given["order"])[0]),
+    "grid": (
+        {"theta_count": _COUNT, "phi_count": _COUNT},
+        lambda given, _: directions.theta_phi_grid(given["theta_count"], given["phi_count"])[0],
+    ),
+    "theta-phi": (
+        _ranges("theta", "phi"),
+        lambda given, _: directions.directions_from_angles(*_mesh(given, "theta", "phi")),
+    ),
+    "azimuth-elevation": (
+        _ranges("azimuth", "elevation"),
+        lambda given, _: directions.directions_from_azimuth_elevation(*_mesh(given, "azimuth", "elevation")),
+    ),
+    "great-circle": (
+        {name: Key("vector", required=True) for name in ("first", "through")}
+        | {"count": _COUNT, "angle_deg_min": Key("number", 0.0), "angle_deg_max": Key("number", 360.0)},
+        lambda given, _: _circle(given),
+    ),
+    "list": (
+        {"directions": Key("vectors", required=True)},
+        lambda given, _: np.asarray(given["directions"], dtype=float),
+    ),
+    "file": ({"path": Key("text", required=True)}, lambda given, folder: _from_file(folder / given["path"])),
 }
+"""Keys of each kind of directions, and what makes these of the values and the folder of the study."""
 
 
 def read_directions(name: str, table: Any, folder: Path, mistakes: list[str]) -> FloatArray | None:
@@ -198,48 +191,36 @@ def read_directions(name: str, table: Any, folder: Path, mistakes: list[str]) ->
         what = "is missing" if kind is None else f"= {kind!r} is unknown"
         mistakes.append(f"[{name}] kind {what}{nearest(str(kind or ''), KINDS)}")
         return None
-    before = len(mistakes)
-    values = read_table(name, {k: v for k, v in table.items() if k != "kind"}, KINDS[kind], mistakes)
+    before, (keys, made) = len(mistakes), KINDS[kind]
+    values = read_table(name, {k: v for k, v in table.items() if k != "kind"}, keys, mistakes)
     if len(mistakes) > before:
         return None
     try:
-        return unit_directions(_made(kind, values, folder), f"[{name}] directions").reshape(-1, 3)
+        return directions.unit_directions(made(values, folder), f"[{name}] directions").reshape(-1, 3)
     except CreepingError as error:
         mistakes.append(f"[{name}] {error}".replace(f"[{name}] [{name}]", f"[{name}]"))
         return None
 
 
-def _made(kind: str, values: dict[str, Any], folder: Path) -> FloatArray:
-    if kind == "fibonacci":
-        return fibonacci_directions(values["count"])
-    if kind == "lebedev":
-        return lebedev_directions(values["order"])[0]
-    if kind == "grid":
-        return theta_phi_grid(values["theta_count"], values["phi_count"])[0]
-    if kind == "theta-phi":
-        return directions_from_angles(*_mesh(values, "theta", "phi"))
-    if kind == "azimuth-elevation":
-        return directions_from_azimuth_elevation(*_mesh(values, "azimuth", "elevation"))
-    if kind == "great-circle":
-        start, stop = np.radians(values["angle_deg_min"]), np.radians(values["angle_deg_max"])
-        # a whole circle ends where it began
-        ends = abs(stop - start) < 2 * np.pi - 1e-9
-        return great_circle(values["first"], values["through"], values["count"], start=start, stop=stop, endpoint=ends)
-    if kind == "list":
-        return np.asarray(values["directions"], dtype=float)
-    return _from_file(folder / values["path"])
+def _circle(given: dict[str, Any]) -> FloatArray:
+    start, stop = np.radians(given["angle_deg_min"]), np.radians(given["angle_deg_max"])
+    # a whole circle ends where it began
+    ends = abs(stop - start) < 2 * np.pi - 1e-9
+    return directions.great_circle(
+        given["first"], given["through"], given["count"], start=start, stop=stop, endpoint=ends
+    )
 
 
 def _mesh(values: dict[str, Any], first: str, second: str) -> tuple[FloatArray, FloatArray]:
     """Angles of both axes in radians (n, m), the second running fastest."""
     axes = []
-    direction_count(f"{first}_count {second}_count", values[f"{first}_count"] * values[f"{second}_count"])
+    directions.direction_count(f"{first}_count {second}_count", values[f"{first}_count"] * values[f"{second}_count"])
     for name in (first, second):
         low, high, count = (values[f"{name}_{part}"] for part in ("deg_min", "deg_max", "count"))
         whole = count > 1 and abs(abs(high - low) - 360) < 1e-9
         axes.append(np.radians(np.linspace(low, high, count, endpoint=not whole)))
-    grids = np.meshgrid(*axes, indexing="ij")
-    return grids[0], grids[1]
+    one, two = np.meshgrid(*axes, indexing="ij")
+    return one, two
 
 
 def _from_file(path: Path) -> FloatArray:
@@ -250,7 +231,8 @@ def _from_file(path: Path) -> FloatArray:
     try:
         if not path.is_file():
             raise InvalidInputError(f"cannot read directions from {path}: there is no such file")
-        if path.stat().st_size > MOST * LINE_BYTES:
+        # a line of three numbers has at most 100 bytes
+        if path.stat().st_size > 100 * MOST:
             raise InvalidInputError(
                 f"{path} has {path.stat().st_size / 1e9:.1f} GB, more than {MOST} directions; divide it"
             )
@@ -262,13 +244,13 @@ def _from_file(path: Path) -> FloatArray:
         raise InvalidInputError(f"cannot read directions from {path}: {error}") from error
     if found.ndim != 2 or found.shape[1] != 3 or found.dtype.kind not in "fiu":
         raise InvalidInputError(f"{path} holds {found.dtype} {found.shape}, not numbers (n, 3)")
-    direction_count(f"{path}: number of directions", len(found))
+    directions.direction_count(f"{path}: number of directions", len(found))
     return np.array(found, dtype=float)
 
 
 def _table(path: Path) -> FloatArray:
     """Numbers of a .csv file (n, columns); a line ``x,y,z`` above them is left out."""
-    lines = text_of(path, MOST * LINE_BYTES, "utf-8-sig").splitlines()
+    lines = text_of(path, 100 * MOST, "utf-8-sig").splitlines()
     rows = [row for row in (line.partition("#")[0].strip() for line in lines) if row]
     if rows and [word.strip(" \t\"'").lower() for word in rows[0].split(",")] == ["x", "y", "z"]:
         rows = rows[1:]

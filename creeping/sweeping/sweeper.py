@@ -46,9 +46,6 @@ from creeping.shadow.line import ShadowLine, ShadowLines, lines_together, shadow
 from creeping.shadow.status import OK, SINGULAR
 from creeping.sweeping.request import CURVED, VALID, SweepRequest
 
-BATCH, FIELD_BATCH = 16_384, 65_536
-"""Rays carried at a time, so that what is known of them stays in the caches; fields are assembled by many calls on few
-numbers, and want more."""
 BY_OBSERVER = ("total", "creeping", "reflected", "forward", "error", "unresolved")
 
 Arrays = dict[str, np.ndarray[Any, Any]]
@@ -141,8 +138,9 @@ class Sweeper:
             out["incidence_status"][:] = OK
             self._fill_together(incidences, out)
             return out
-        together = BATCH if self._tracer is None else FIELD_BATCH
-        batch = max(1, together // self.request.n_rays)
+        # rays at a time, so that what is known of them stays in the caches; fields are assembled by many calls on few
+        # numbers, and want more
+        batch = max(1, (16_384 if self._tracer is None else 65_536) // self.request.n_rays)
         for first in range(0, len(incidences), batch):
             part = slice(first, first + batch)
             count = len(incidences[part])

@@ -68,8 +68,9 @@ class Ball:
 
     def far_field(self, r: FloatArray) -> ComplexArray:
         """Far field (m, d), of a conductor scattered and incident along theta and phi (m, d, 2, 2)."""
-        each = conducting_ball if self.boundary == "pec" else _scalar_ball
-        return np.stack([each(self.k, d, r, self.boundary) for d in self.directions], axis=1)
+        if self.boundary == "pec":
+            return np.stack([conducting_ball(self.k, d, r) for d in self.directions], axis=1)
+        return np.stack([sphere.far_field(self.k, 1.0, r @ d, self.boundary) for d in self.directions], axis=1)
 
     def total(self, x: FloatArray) -> Any:
         """Total field (n, d), of a conductor E and H (n, 3, d, 2); on the sphere too."""
@@ -87,29 +88,17 @@ class Ball:
         return np.stack(each, axis=1)
 
 
-def _scalar_ball(k: float, d: FloatArray, r: FloatArray, boundary: Any) -> ComplexArray:
-    return sphere.far_field(k, 1.0, r @ d, boundary)
-
-
-def conducting_ball(k: float, d: FloatArray, r: FloatArray, boundary: Any = "pec") -> ComplexArray:
+def conducting_ball(k: float, d: FloatArray, r: FloatArray) -> ComplexArray:
     """Far field of the unit ball, theta and phi scattered by theta and phi incident: (3,), (m, 3) -> (m, 2, 2)."""
     across = np.cross(r, d)
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     before, after = dipoles.frames(d[None])[0], dipoles.frames(r)
     total = np.zeros((len(r), 2, 2), dtype=complex)
     # across and in the plane of scattering, as `tests.reference.sphere` has them
-    for amplitude, e, s in zip(
-        sphere.pec_far_field(k, 1.0, r @ d),
-        (across, np.cross(across, d)),
-        (across, np.cross(across, r)),
-        strict=True,
-    ):
+    waves = (across, np.cross(across, d)), (across, np.cross(across, r))
+    for amplitude, e, s in zip(sphere.pec_far_field(k, 1.0, r @ d), *waves, strict=True):
         total += amplitude[:, None, None] * np.einsum("moc,mc->mo", after, s)[:, :, None] * (e @ before.T)[:, None]
     return total
-
-
-DEPTHS = {"triaxial": 0.2, "slender": 0.15, "flat": 0.2, "egg": 0.2, "torus": 0.2}
-"""Depths of a conductor's dipoles, L, where they differ from those of the scalar sources."""
 
 
 def reference_of(name: str, k: float, boundary: Any, incidences: FloatArray) -> Any:
@@ -119,7 +108,9 @@ def reference_of(name: str, k: float, boundary: Any, incidences: FloatArray) -> 
     _, body, depth = bodies()[name]
     dense = 8.0 if k < 20 else 6.0
     if boundary == "pec":
-        return dipoles.scatter(body, k, incidences, depth=DEPTHS.get(name, depth), per_wavelength=dense)
+        # a conductor's dipoles lie deeper than the scalar sources of some bodies
+        depth = {"triaxial": 0.2, "slender": 0.15, "flat": 0.2, "egg": 0.2, "torus": 0.2}.get(name, depth)
+        return dipoles.scatter(body, k, incidences, depth=depth, per_wavelength=dense)
     return fundamental.scatter(body, k, incidences, boundary, depth=depth, per_wavelength=dense)
 
 

@@ -39,12 +39,8 @@ BODIES: dict[str, tuple[Any, float]] = {
     "cube": (lambda: sc.Implicit("max(x-1,-x-1,y-1,-y-1,z-1,-z-1)", bounds=[[-1.1] * 3, [1.1] * 3]), 5.0),
 }
 """Bodies of the cases ``edged_NAME`` and their wavenumbers, 1/L."""
-BOUNDARIES: dict[str, Any] = {
-    "hard": "hard",
-    "soft": "soft",
-    "impedance": cr.ImpedanceBoundary(ADMITTANCE),
-    "pec": "pec",
-}
+BOUNDARIES: dict[str, Any] = {kind: kind for kind in ("hard", "soft", "pec")}
+BOUNDARIES["impedance"] = cr.ImpedanceBoundary(ADMITTANCE)
 
 CASES: dict[str, tuple[Any, Profile]] = {
     "capsule 4": (sc.Capsule(1.0, 4.0), capsule_profile(1.0, 4.0)),
@@ -101,11 +97,7 @@ def edged(count: int | None = None) -> Iterator[Row]:
     for name, kind in names()[:count]:
         took, one = seconds(name, kind), row(name, kind)
         covered.append(one["true"] <= one["stated"])
-        shares = {
-            "rms": 100 * one["rms"],
-            "largest": 100 * one["largest"],
-            "covered": 100 * float(np.mean(covered[-1])),
-        }
+        shares = {"rms": 100 * one["rms"], "largest": 100 * one["largest"], "covered": 100 * np.mean(covered[-1])}
         ratio = float(np.median(one["stated"] / one["true"]))
         yield {"body": name, "boundary": kind, "nodes": one["nodes"], **shares, "ratio": ratio, "s": took}
     share = 100 * float(np.mean(np.concatenate(covered)))
@@ -156,11 +148,8 @@ def joint_row(name: str, k: float, boundary: Any, theta: float, seed: int) -> di
 
 def _judged(off: ComplexArray, stated: FloatArray, unit: float) -> tuple[float, float, float]:
     true = np.abs(off)
-    return (
-        100 * float(np.quantile(true, 0.95)) / unit,
-        100 * float(np.max(true)) / unit,
-        100 * float(np.mean(true <= stated)),
-    )
+    worst = 100 * float(np.quantile(true, 0.95)) / unit, 100 * float(np.max(true)) / unit
+    return *worst, 100 * float(np.mean(true <= stated))
 
 
 def joints(names: Sequence[str] = tuple(CASES), wavenumbers: Sequence[float] = (20.0, 40.0)) -> Iterator[Row]:

@@ -25,7 +25,7 @@ from studies import Row, main
 from studies.accuracy.bodies import rms
 from tests.exact_meshes import on_body, scattered, slivers
 
-POINTS, RAYS, LENGTH = 3000, 60, 2.0
+LENGTH = 2.0
 NAMES = ("ellipsoid", "torus", "twisted")
 COUNTS = (2000, 10_000, 40_000)
 
@@ -35,16 +35,16 @@ def mesh_body(points: FloatArray, triangles: IntArray, **options: Any) -> Any:
     return sc.Mesh(SimpleNamespace(vertices=points, faces=triangles), cache=False, **options)
 
 
-def errors(exact: Any, body: Any, seed: int = 3) -> dict[str, float]:
+def errors(exact: Any, body: Any) -> dict[str, float]:
     """Differences of a body from the exact one; see the module head."""
-    x, p = random_bundle_points(exact, POINTS, rng=np.random.default_rng(seed))
+    x, p = random_bundle_points(exact, 3000, rng=np.random.default_rng(3))
     y = project(body, x)
     kappa = [
         np.einsum("ni,nij,nj->n", p, one.hessian(at), p) / np.linalg.norm(one.gradient(at), axis=1)
         for one, at in ((exact, x), (body, y))
     ]
     times = np.linspace(0, LENGTH, 17)
-    starts = [(exact, x[:RAYS], p[:RAYS]), (body, *project_bundle(body, y[:RAYS], p[:RAYS]))]
+    starts = [(exact, x[:60], p[:60]), (body, *project_bundle(body, y[:60], p[:60]))]
     ends = [cr.DirectFlow(one, rtol=1e-11).transport(pack(a, b, lanes=12), times)[:, -1] for one, a, b in starts]
     convex = np.isinf(ends[0][:, 11]) & np.isinf(ends[1][:, 11])
     return {
@@ -94,20 +94,15 @@ def geodesics(names: tuple[str, ...] = NAMES, counts: tuple[int, ...] = COUNTS) 
     for name in names:
         for count in counts:
             exact, points, triangles = on_body(name, count)
-            starts, p = _starts(exact, points, 4096)
+            rng = np.random.default_rng(5)
+            starts = rng.integers(len(points), size=4096)
+            _, p = project_bundle(exact, points[starts], rng.normal(size=(4096, 3)))
             ends, _ = cr.trace(exact, points[starts], p, LENGTH, rtol=1e-12)
             row: Row = {"body": name, "vertices": len(points)}
             row |= _fitted(points, triangles, points[starts], p, ends)
             # fewer: it takes as long
             row |= _unfolded(points, triangles, starts[:200], p[:200], ends[:200])
             yield row
-
-
-def _starts(exact: Any, points: FloatArray, count: int) -> tuple[IntArray, FloatArray]:
-    rng = np.random.default_rng(5)
-    starts = rng.integers(len(points), size=count)
-    _, p = project_bundle(exact, points[starts], rng.normal(size=(count, 3)))
-    return starts, p
 
 
 def _fitted(points: FloatArray, triangles: IntArray, x: FloatArray, p: FloatArray, ends: FloatArray) -> Row:
@@ -143,7 +138,5 @@ def _errors(name: str, difference: FloatArray) -> Row:
 
 
 if __name__ == "__main__":
-    main(
-        (even, awkward, geodesics),
-        {"even": {"counts": COUNTS[:2]}, "awkward": {"count": 2000}, "geodesics": {"counts": COUNTS[:1]}},
-    )
+    quick: dict[str, Any] = {"even": {"counts": COUNTS[:2]}, "awkward": {"count": 2000}}
+    main((even, awkward, geodesics), quick | {"geodesics": {"counts": COUNTS[:1]}})

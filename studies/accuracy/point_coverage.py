@@ -121,15 +121,11 @@ def _scalar(
     name: str, k: float, boundary: Any, fan: RayFan, points: FloatArray, on: FloatArray, normals: FloatArray, lit: Any
 ) -> tuple[FloatArray, Any, Any, dict[str, Part], float]:
     """True errors off the body, the fields off it and on it, parts on it, and the reference's residual."""
-    solution, kind, soft = (
-        reference_of(name, k, boundary, fan.line.direction[None]),
-        kind_of(boundary),
-        boundary == "soft",
-    )
+    solution, soft = reference_of(name, k, boundary, fan.line.direction[None]), boundary == "soft"
     exact = solution.total(points)[:, 0]
     there = (solution.normal_derivative(on, normals) if soft else solution.total(on))[:, 0]
-    near = cr.near_field(fan, points, wavenumber=k, boundary=kind)
-    surface = cr.surface_field(fan, on, wavenumber=k, boundary=kind)
+    near = cr.near_field(fan, points, wavenumber=k, boundary=kind_of(boundary))
+    surface = cr.surface_field(fan, on, wavenumber=k, boundary=kind_of(boundary))
     wrong, unit = np.abs(surface - there), k if soft else 1.0
     parts: dict[str, Part] = {"on lit": (wrong, surface, lit, unit), "dark": (wrong, surface, ~lit, unit)}
     return np.abs(near - exact), near, surface, parts, float(solution.residual[0])
@@ -165,17 +161,15 @@ def _table(names: Sequence[str], boundaries: Sequence[Any], wavenumbers: Sequenc
                 every.append(found)
                 yield {"body": name, "boundary": boundary, "k": k} | _cells(found)
     for what, of in (("mean", np.nanmean), ("least", np.nanmin)):
-        yield {"body": what, "boundary": "", "k": ""} | _cells(
-            {key: float(of([r[key] for r in every])) for key in every[0]}
-        )
+        together = {key: float(of([r[key] for r in every])) for key in every[0]}
+        yield {"body": what, "boundary": "", "k": ""} | _cells(together)
 
 
 def _cells(found: Row) -> Row:
-    parts = [part for part in found if f"{part} ratio" in found]
-    texts = {
-        part: "{:.1f} ({:.1f}, {:.1f})".format(*(found[part + of] for of in ("", " ratio", " error"))) for part in parts
-    }
-    return texts | {what: found[what] for what in ("off", "on", "rays")}
+    cells = {what: found[what] for what in ("off", "on", "rays")}
+    for part in (part for part in found if f"{part} ratio" in found):
+        cells[part] = "{:.1f} ({:.1f}, {:.1f})".format(*(found[part + of] for of in ("", " ratio", " error")))
+    return cells
 
 
 def scalar(

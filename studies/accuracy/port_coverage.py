@@ -18,14 +18,6 @@ from studies.accuracy.bodies import random_directions
 from tests.reference.clouds import ellipsoid
 from tests.reference.hard_ports import coupled, sphere_coupling
 
-CASES = (
-    ((1.0, 0.8, 0.6), 20.0, 0.2, 1),
-    ((1.2, 1.0, 0.8), 15.0, 0.25, 2),
-    ((0.7, 0.9, 1.1), 18.0, 0.22, 6),
-    ((0.8, 0.9, 1.1), 20.0, 0.25, 11),
-)
-"""Half-axes, k, depth of the fundamental solutions, and seed of the ports."""
-
 
 def _row(part: str, off: FloatArray, size: FloatArray, stated: FloatArray, spread: FloatArray, most: float) -> Row:
     """Errors of one part of the pairs; ``worst`` is that which a share ``most`` of them keeps to."""
@@ -76,12 +68,19 @@ def spheres() -> Iterator[Row]:
     return ({"ka": str(ka)} | sphere_row(ka) for ka in (10.0, 30.0, 100.0))
 
 
-def ellipsoids(cases: tuple[int, ...] = (0, 1, 2, 3)) -> Iterator[Row]:
+def ellipsoids(most: int = 4) -> Iterator[Row]:
     """Ellipsoids: median error and that of 95 of 100 pairs, stated error in the median, share covered."""
-    for number in cases:
-        axes, k, *_ = case = CASES[number]
+    # half-axes, k, depth of the fundamental solutions, and seed of the ports
+    cases = (
+        ((1.0, 0.8, 0.6), 20.0, 0.2, 1),
+        ((1.2, 1.0, 0.8), 15.0, 0.25, 2),
+        ((0.7, 0.9, 1.1), 18.0, 0.22, 6),
+        ((0.8, 0.9, 1.1), 20.0, 0.25, 11),
+    )
+    for case in cases[:most]:
+        axes, k, *_ = case
         yield from ({"half-axes": ", ".join(map(str, axes)), "k": k} | row for row in ellipsoid_rows(*case))
 
 
 if __name__ == "__main__":
-    main((spheres, ellipsoids), {"ellipsoids": {"cases": ()}})
+    main((spheres, ellipsoids), {"ellipsoids": {"most": 0}})

@@ -24,14 +24,7 @@ from creeping._typing import Any
 from creeping.commands.options import CAD, MESHES
 from studies import Row, main
 
-OPTIONS: dict[str, Any] = {
-    "part": "largest",
-    "cap": 1e9,
-    "subdivide": "auto",
-    "union": True,
-    "sew": 1e-3,
-    "units": "m",
-}
+OPTIONS = {"part": "largest", "cap": 1e9, "subdivide": "auto", "union": True, "sew": 1e-3, "units": "m"}
 """What is taken of an option that a refusal names, in this order."""
 EMPTY: Row = dict.fromkeys(
     "file, options, stage, body s, fan s, all s, lost, method, field, error, unresolved, refusal".split(", "), ""

@@ -11,10 +11,12 @@ Run ``python -m studies flow_speed [--quick]`` (ten minutes).
 import math
 import os
 import time
+import timeit
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cache, partial
+from unittest.mock import patch
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -31,37 +33,30 @@ from studies import Row, main
 from studies.accuracy.bodies import rms
 
 BODIES = ("ellipsoid", "torus", "twisted", "gridded")
-SHAPES: dict[str, Callable[[], Any]] = {
-    "ellipsoid": lambda: sc.Ellipsoid(1.2, 0.8, 0.8),
-    "triaxial": lambda: sc.Ellipsoid(1.37, 0.91, 0.66),
-    "torus": sc.Torus,
-    "twisted": sc.TwistedEllipsoid,
-    "gridded": lambda: sc.Gridded.sampled(sc.TwistedEllipsoid(), 64),
-    "peanut": lambda: sc.Implicit("(x**2 + y**2 + z**2 + 0.64)**2 - 2.56*x**2 - 0.6561"),
-    "bumpy": lambda: sc.Implicit("x**2 + y**2 + z**2 - 1 - 0.3*sin(3*x)*sin(3*y)*sin(3*z)"),
-}
 EXPENSIVE = ("gridded",)
 """Bodies whose F takes a microsecond: fewer rays are integrated directly."""
 LENGTH = 8.0
 NS = 1e9 / LENGTH
-EXAMPLES: dict[str, tuple[Any, tuple[int, ...]]] = {
-    "1 ellipsoid": (sc.Ellipsoid(1.2, 0.8, 0.8), (16, 64)),
-    "2 torus": (sc.Torus(), (32, 64, 64)),
-    "3 speed 1 + x": (sc.Sphere(speed="1 + x"), (16, 64)),
-    "4 twisted": (sc.TwistedEllipsoid(), (24, 96)),
-}
-"""Bodies and grids of [YC06b]."""
 
 
 @cache
 def body(name: str) -> Any:
     """Body of a name; "gridded" is the twisted ellipsoid given by samples on 64^3 nodes."""
-    return SHAPES[name]()
+    shapes: dict[str, Callable[[], Any]] = {
+        "ellipsoid": lambda: sc.Ellipsoid(1.2, 0.8, 0.8),
+        "triaxial": lambda: sc.Ellipsoid(1.37, 0.91, 0.66),
+        "torus": sc.Torus,
+        "twisted": sc.TwistedEllipsoid,
+        "gridded": lambda: sc.Gridded.sampled(sc.TwistedEllipsoid(), 64),
+        "peanut": lambda: sc.Implicit("(x**2 + y**2 + z**2 + 0.64)**2 - 2.56*x**2 - 0.6561"),
+        "bumpy": lambda: sc.Implicit("x**2 + y**2 + z**2 - 1 - 0.3*sin(3*x)*sin(3*y)*sin(3*z)"),
+    }
+    return shapes[name]()
 
 
-def random_rays(shape: Any, count: int, seed: int = 11) -> FloatArray:
+def random_rays(shape: Any, count: int) -> FloatArray:
     """States (count, 6) at random in T1Q."""
-    return pack(*random_bundle_points(shape, count, rng=np.random.default_rng(seed)))
+    return pack(*random_bundle_points(shape, count, rng=np.random.default_rng(11)))
 
 
 def pencils(shape: Any, count: int, pencil: int = 32, opening: float = 0.02) -> FloatArray:
@@ -91,21 +86,16 @@ class Sample:
 
 
 @cache
-def sample(name: str, count: int, seed: int = 11) -> Sample:
+def sample(name: str, count: int) -> Sample:
     """Fresh random rays, traced at 1e-13; at most 400 where F is expensive."""
-    states = random_rays(body(name), min(count, 400) if name in EXPENSIVE else count, seed)
+    states = random_rays(body(name), min(count, 400) if name in EXPENSIVE else count)
     return Sample(body(name), states, trace_states(body(name), states, np.array([LENGTH]), rtol=1e-13)[:, 0])
 
 
 def seconds_of(call: Callable[[], object], repeats: int = 3) -> float:
     """Least processor time of the calls after one for warming up, s."""
     call()
-    least = math.inf
-    for _ in range(repeats):
-        started = time.process_time()
-        call()
-        least = min(least, time.process_time() - started)
-    return least
+    return min(timeit.repeat(call, timer=time.process_time, number=1, repeat=repeats))
 
 
 def seconds_each(flow: Any, states: FloatArray, repeats: int = 5) -> float:
@@ -114,7 +104,7 @@ def seconds_each(flow: Any, states: FloatArray, repeats: int = 5) -> float:
 
 
 @cache
-def built(name: str, rays: float = 1e6, tolerance: float = 1e-6) -> tuple[cr.PhaseMap, float]:
+def built(name: str, rays: float = 1e6) -> tuple[cr.PhaseMap, float]:
     """Map tuned for so many rays of LENGTH, and seconds of its build, probing included; compiled before.
 
     Raises
@@ -125,7 +115,7 @@ def built(name: str, rays: float = 1e6, tolerance: float = 1e-6) -> tuple[cr.Pha
     _compile(name)
     started = time.process_time()
     flow = cr.build_phase_map(
-        body(name), tolerance=tolerance, length=LENGTH, n_steps=1, n_rays=int(rays), carry_jacobi=False, cache=False
+        body(name), tolerance=1e-6, length=LENGTH, n_steps=1, n_rays=int(rays), carry_jacobi=False, cache=False
     )
     return flow, time.process_time() - started
 
@@ -145,18 +135,9 @@ def direct_at(name: str, tolerance: float) -> cr.DirectFlow:
     return tuned_direct(body(name), LENGTH, 1, tolerance, False)[0]
 
 
-@contextmanager
-def threads(count: int) -> Iterator[None]:
+def threads(count: int) -> AbstractContextManager[Any]:
     """Run with so many threads."""
-    before = os.environ.get("CREEPING_THREADS")
-    os.environ["CREEPING_THREADS"] = str(count)
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ["CREEPING_THREADS"]
-        else:
-            os.environ["CREEPING_THREADS"] = before
+    return patch.dict(os.environ, CREEPING_THREADS=str(count))
 
 
 def card(flow: cr.PhaseMap) -> Row:
@@ -289,43 +270,10 @@ def break_even(
             error = sample(name, samples).error(flow)
             direct = direct_at(name, error)
             composed, order8 = seconds_each(flow, random_rays(body(name), count)), seconds_each(direct, few, 3)
-            row = {
-                "body": name,
-                "tuned for": number,
-                "build s": seconds,
-                "map": 1e6 * composed,
-                "order 8": 1e6 * order8,
-            }
-            row |= {"map error": error}
-            row["order 8 error"] = sample(name, samples).error(direct)
+            row = {"body": name, "tuned for": number, "build s": seconds, "map": 1e6 * composed}
+            row |= {"order 8": 1e6 * order8, "map error": error, "order 8 error": sample(name, samples).error(direct)}
             row["rays"] = seconds / (order8 - composed) if order8 > composed else math.inf
             yield row | card(flow)
-
-
-def requested(
-    names: tuple[str, ...] = BODIES, exponents: tuple[int, ...] = (3, 4, 5, 6, 7, 8, 9), samples: int = 4000
-) -> Iterator[Row]:
-    """Tolerance asked for and error reached over fresh rays; states only.
-
-    "worst" is the largest of five such samples: on the torus a ray in thousands carries most of the error.
-    """
-    for name in names:
-        others = () if name in EXPENSIVE else (21, 22, 23, 24)
-        for exponent in exponents:
-            wanted = 10.0**-exponent
-            row = {"body": name, "requested": wanted, "achieved": math.nan}
-            try:
-                flow, seconds = built(name, tolerance=wanted)
-            except cr.ToleranceError as error:
-                yield row | {"remark": f"refused: {error}"}
-                continue
-            fresh = sample(name, samples)
-            gaps = fresh.gaps(flow.transport(fresh.states, np.array([LENGTH]))[:, 0])
-            row |= {"achieved": rms(gaps), "ratio": rms(gaps) / wanted}
-            row["worst"] = max([rms(gaps), *(sample(name, samples, seed).error(flow) for seed in others)])
-            row |= {"median": float(np.median(gaps)), "largest": float(gaps.max())}
-            row["map ns"] = NS * seconds_each(flow, fresh.states)
-            yield row | {"build s": seconds, **card(flow)}
 
 
 def two_threads(names: tuple[str, ...] = ("ellipsoid", "twisted"), count: int = 100_000) -> Iterator[Row]:
@@ -373,8 +321,14 @@ def one_leap(samples: int = 2000, tolerance: float = 1e-6) -> Iterator[Row]:
     T0 = 1/8, tau = 2^-10, S = 7, B = 2, cubic splines; errors over random points of T1Q, seconds of a second build.
     """
     paper: dict[str, Any] = {"horizon": 1 / 8, "time_step": 2**-10, "stages": 7, "degree": 3, "method": "tower"}
-    asked = [(name, shape, paper | {"grid": grid}) for name, (shape, grid) in EXAMPLES.items()]
-    chosen = {"sphere": sc.Sphere(), **{name[2:]: shape for name, (shape, _) in EXAMPLES.items()}}
+    examples: dict[str, tuple[Any, tuple[int, ...]]] = {
+        "1 ellipsoid": (sc.Ellipsoid(1.2, 0.8, 0.8), (16, 64)),
+        "2 torus": (sc.Torus(), (32, 64, 64)),
+        "3 speed 1 + x": (sc.Sphere(speed="1 + x"), (16, 64)),
+        "4 twisted": (sc.TwistedEllipsoid(), (24, 96)),
+    }
+    asked = [(name, shape, paper | {"grid": grid}) for name, (shape, grid) in examples.items()]
+    chosen = {"sphere": sc.Sphere(), **{name[2:]: shape for name, (shape, _) in examples.items()}}
     asked += [(name, shape, {"tolerance": tolerance}) for name, shape in chosen.items()]
     for name, shape, options in asked:
         seconds = seconds_of(partial(cr.build_phase_map, shape, cache=False, **options), 1)
@@ -385,15 +339,12 @@ def one_leap(samples: int = 2000, tolerance: float = 1e-6) -> Iterator[Row]:
         yield row | {"build s": seconds, **card(flow)}
 
 
-QUICK: dict[str, Any] = {
-    "long_leaps": {"count": 4096, "samples": 1000},
-    "break_even": {"names": BODIES[:3], "tuned": (1e4, 1e6)},
-    "requested": {"names": BODIES[:3], "exponents": (3, 5, 7), "samples": 1000},
-    "two_threads": {"count": 20_000},
-    "sizes": {"numbers": (1000, 10_000, 100_000), "nodes": (20, 30, 40)},
-}
-
-
 if __name__ == "__main__":
+    quick: dict[str, Any] = {
+        "long_leaps": {"count": 4096, "samples": 1000},
+        "break_even": {"names": BODIES[:3], "tuned": (1e4, 1e6)},
+        "two_threads": {"count": 20_000},
+        "sizes": {"numbers": (1000, 10_000, 100_000), "nodes": (20, 30, 40)},
+    }
     with threads(1):
-        main((long_leaps, break_even, requested, two_threads, sizes, one_leap), QUICK)
+        main((long_leaps, break_even, two_threads, sizes, one_leap), quick)

@@ -1,8 +1,7 @@
 """What do an incidence, a frequency and a value between cost? Lines, rays and fields in bulk, and their errors.
 
-Shadow lines at sweep speed, of 1000 incidences on five bodies: those of the three meshes, the finer ones where needed,
-against (a) the finest mesh for all and (b) the independent `creeping.shadow_line`, panels of exact points, on every
-tenth direction.
+Shadow lines at sweep speed, of 1000 incidences on five bodies, against the independent `creeping.shadow_line`, panels
+of exact points, on every tenth direction.
 
 Rays are 256 of length 4, with J and attenuation at their ends. Times are processor times on one thread, least of
 several, results in memory; errors of rays are those from the same launch points by order 8 at 1e-12. Maps are built
@@ -20,13 +19,8 @@ import creeping as cr
 import scatterers as sc
 from creeping._typing import Any, FloatArray
 from creeping.geometry.directions import fibonacci_directions, great_circle
-from creeping.geometry.incident import rows_of
 from creeping.phaseflow.request import tuned_direct
-from creeping.shadow.arcs import finished
-from creeping.shadow.curves import Curves
-from creeping.shadow.line import TOGETHER, shadow_lines
-from creeping.shadow.meshes import LineMeshes, critical_distances, judged, prepared, traced
-from creeping.shadow.refinement import FORBIDDEN
+from creeping.shadow.line import shadow_lines
 from creeping.shadow.status import FOLLOWED, INCIDENCE_STATUSES, NEAR_SINGULAR, OK, SINGULAR, STATUSES
 from creeping.sweeping.request import sweep_request
 from creeping.sweeping.sweeper import Sweeper
@@ -182,23 +176,6 @@ class Lines(NamedTuple):
     singular_distance: FloatArray
 
 
-def on_mesh(body: Any, directions: FloatArray, tier: int) -> Lines:
-    """Lines on one mesh; none is sought on another or followed."""
-    waves, numbers = rows_of(directions), np.full((len(directions), 5), np.nan)
-    certain = np.zeros(len(directions), dtype=bool)
-    for start in range(0, len(waves), TOGETHER):
-        nodes, sure = traced(body, waves[start : start + TOGETHER], tier)
-        rows = start + np.flatnonzero([one is not None for one in nodes])
-        curves = Curves.of(waves[rows], [one for one in nodes if one is not None])
-        found = finished(body, curves, RAYS)
-        numbers[rows] = np.column_stack([curves.counts, curves.lengths, found.shares])
-        certain[rows] = sure[rows - start] & found.certain
-    v = critical_distances(body, directions)
-    _, status = judged(v, certain, prepared(body).turn(tier), LineMeshes.count - 2)
-    status[v < FORBIDDEN] = SINGULAR
-    return Lines(status, numbers[:, 0], numbers[:, 1], numbers[:, 2:], v)
-
-
 def swept(body: Any, directions: FloatArray) -> Lines:
     """Lines as a sweep gets them."""
     found = shadow_lines(body, directions, RAYS)
@@ -238,56 +215,36 @@ def differences(found: Lines, exact: Lines) -> Row:
     return row | {"compared": int(both.sum())}
 
 
-@cache
-def measured(name: str, count: int, every: int) -> tuple[Row, Row, Row]:
-    """One body: cost and statuses, then errors against the finest mesh and against the independent line."""
-    shape, directions = body(name), fibonacci_directions(count)
-    found = swept(shape, directions)
-    seconds, meshes = (
-        seconds_of(call) / count for call in (partial(swept, shape, directions), partial(on_mesh, shape, directions, 0))
-    )
-    second = int(np.sum(on_mesh(shape, directions, 0).status != OK))
-    third = int(np.sum(on_mesh(shape, directions, 1).status != OK))
-    first: Row = {"body": name, "us a line": 1e6 * seconds, "on the first mesh": 1e6 * meshes}
-    for code in (OK, NEAR_SINGULAR, FOLLOWED, SINGULAR):
-        first[INCIDENCE_STATUSES[code].split(":")[0]] = int(np.sum(found.status == code))
-    least = np.min(found.singular_distance)
-    first |= {"need mesh 2": second, "need mesh 3": third}
-    counts = np.unique(found.curves[np.isfinite(found.curves)]).astype(int)
-    first |= {"curves seen": " ".join(map(str, counts)), "least v": float(least) if np.isfinite(least) else np.nan}
-    exact = on_mesh(shape, directions, 2)
-    # what even the finest mesh is not certain of is no reference
-    exact.length[exact.status == FOLLOWED] = np.nan
-    one_by_one, each = independent(shape, directions[::every])
-    few = Lines(*(values[::every] for values in found))
-    against = {"body": name, "s a line": each, **differences(few, one_by_one)}
-    return first, {"body": name, **differences(found, exact)}, against
-
-
-def lines(names: tuple[str, ...] = LINE_BODIES, count: int = 1000, every: int = 10) -> Iterator[Row]:
-    """Cost of a line (and without following single lines), statuses, meshes and curves of Fibonacci incidences."""
-    return (measured(name, count, every)[0] for name in names)
-
-
-def finest(names: tuple[str, ...] = LINE_BODIES, count: int = 1000, every: int = 10) -> Iterator[Row]:
-    """Against the finest mesh: counts that differ and worst errors, of certain lines and of all."""
-    return (measured(name, count, every)[1] for name in names)
+def lines(names: tuple[str, ...] = LINE_BODIES, count: int = 1000) -> Iterator[Row]:
+    """Cost of a line, statuses and curves of Fibonacci incidences."""
+    directions = fibonacci_directions(count)
+    for name in names:
+        found = swept(body(name), directions)
+        row: Row = {"body": name, "us a line": 1e6 * seconds_of(partial(swept, body(name), directions)) / count}
+        for code in (OK, NEAR_SINGULAR, FOLLOWED, SINGULAR):
+            row[INCIDENCE_STATUSES[code].split(":")[0]] = int(np.sum(found.status == code))
+        counts = np.unique(found.curves[np.isfinite(found.curves)]).astype(int)
+        least = float(np.min(found.singular_distance))
+        yield row | {"curves seen": " ".join(map(str, counts)), "least v": least if np.isfinite(least) else np.nan}
 
 
 def panels(names: tuple[str, ...] = LINE_BODIES, count: int = 1000, every: int = 10) -> Iterator[Row]:
-    """Against shadow_line, some of them: the same."""
-    return (measured(name, count, every)[2] for name in names)
-
-
-QUICK: dict[str, Any] = {
-    **{name: {"count": 100} for name in ("lines", "finest", "panels")},
-    "fans": {"count": 64, "checked": 4},
-    "fields": {"count": 32},
-    "between": {"tenth": 10},
-    "frequencies": {"methods": ("rays",)},
-}
+    """Against shadow_line, some of them: counts that differ and worst errors, of certain lines and of all."""
+    directions = fibonacci_directions(count)
+    for name in names:
+        exact, each = independent(body(name), directions[::every])
+        few = Lines(*(values[::every] for values in swept(body(name), directions)))
+        yield {"body": name, "s a line": each, **differences(few, exact)}
 
 
 if __name__ == "__main__":
+    quick: dict[str, Any] = {
+        "lines": {"count": 100},
+        "panels": {"count": 100},
+        "fans": {"count": 64, "checked": 4},
+        "fields": {"count": 32},
+        "between": {"tenth": 10},
+        "frequencies": {"methods": ("rays",)},
+    }
     with threads(1):
-        main((lines, finest, panels, fans, fields, between, frequencies), QUICK)
+        main((lines, panels, fans, fields, between, frequencies), quick)

@@ -22,10 +22,10 @@ from creeping.files import read_cut
 from creeping.plotting.pages import COLOURS, EXACT, new_figure
 from creeping.sweeping.echoes import echo_of
 from studies import Row, main
+from studies.accuracy.bodies import rms
 from studies.figures.drawing import plain_ticks
 from tests.reference import sphere
 
-AUSTIN = "austin_IA_s7f6_bistatic.csv"
 FREQUENCIES = "Benchmark_Frequency_TS.csv"
 SOUND = 1477.3
 """Speed of sound of Jech's tables, m/s."""
@@ -54,10 +54,9 @@ def published_strengths(folder: Path, shape: str, boundary: str) -> tuple[FloatA
     """Frequencies, kHz, and target strengths, dB, of the exact solutions."""
     column = f"{'Sphere' if shape == 'Sphere' else 'ProlateSpheroid'}_{BOUNDARIES[boundary]}"
     with open(folder / FREQUENCIES, encoding="utf-8") as file:
-        rows = [(float(row["Frequency_kHz"]), row[column]) for row in csv.DictReader(file)]
-    known = [(f, float(value)) for f, value in rows if value not in ("NA", "")]
-    found = np.array(known).T
-    return found[0], found[1]
+        rows = [(row["Frequency_kHz"], row[column]) for row in csv.DictReader(file) if row[column] not in ("NA", "")]
+    kilohertz, levels = np.array(rows, dtype=float).T
+    return kilohertz, levels
 
 
 def mie(echo: Echo, radius: float = 9.6) -> FloatArray:
@@ -125,10 +124,6 @@ def _picture(
         axes[0].fill_between(cut.angles, low[c, :, 0], high[c, :, 0], color=COLOURS[c], alpha=0.2, lw=0)
         axes[0].plot(cut.angles, cut.levels()[c, :, 0], label=channel, **look)
         axes[1].plot(cut.angles, residual[c], **look)
-    axes[0].set_title(
-        "a  conducting sphere of 19.2 m at 320 MHz, bistatic: cross section (dBsm)", fontsize=9, loc="left"
-    )
-    axes[1].set_title("   residual (dB)", fontsize=9, loc="left")
     axes[1].set_xlabel("azimuth from the radar (degrees)", fontsize=9)
     for ax, shape in zip(axes[2:], ("Sphere", "Spheroid"), strict=True):
         for c, boundary in enumerate(BOUNDARIES):
@@ -140,9 +135,14 @@ def _picture(
             ax.plot(kilohertz, echo.levels()[0, 0], label=boundary, **look)
         ax.set_ylim(*((-60, -38) if shape == "Sphere" else (-45, -20)))
         ax.set_xlabel("frequency (kHz)", fontsize=9)
-    axes[2].set_title("b  sphere of 1 cm: target strength (dB re 1 m)", fontsize=9, loc="left")
-    axes[3].set_title("c  prolate spheroid, 7 x 1 cm, broadside: target strength (dB re 1 m)", fontsize=9, loc="left")
-    for ax in axes:
+    titles = (
+        "a  conducting sphere of 19.2 m at 320 MHz, bistatic: cross section (dBsm)",
+        "   residual (dB)",
+        "b  sphere of 1 cm: target strength (dB re 1 m)",
+        "c  prolate spheroid, 7 x 1 cm, broadside: target strength (dB re 1 m)",
+    )
+    for ax, title in zip(axes, titles, strict=True):
+        ax.set_title(title, fontsize=9, loc="left")
         ax.grid(color="#d9dde0", linewidth=0.5)
         plain_ticks(ax)
         if ax is not axes[1]:
@@ -161,7 +161,7 @@ def _reference(ax: Any, shape: str, boundary: str, echo: Echo, kilohertz: FloatA
 
 def large_sphere(folder: Path) -> Iterator[Row]:
     """The Austin suite's sphere: differences, dB, their Austin measure, and the share within the stated error."""
-    echo, given = conducting_sphere(), read_cut(_known(folder, AUSTIN))
+    echo, given = conducting_sphere(), read_cut(_known(folder, "austin_IA_s7f6_bistatic.csv"))
     low, high = echo.bounds()
     for c, channel in enumerate(echo.channels):
         levels = given.of(channel)
@@ -190,13 +190,8 @@ def small_bodies(folder: Path) -> Iterator[Row]:
                 if np.any(part):
                     off, stated = (levels - given)[part], (high - levels)[part]
                     row: Row = {"body": f"{shape.lower()}, {boundary}", "k times waist": f"{first:g}-{last:g}"}
-                    row |= {
-                        "places": int(part.sum()),
-                        "mean": float(np.mean(off)),
-                        "rms": float(np.sqrt(np.mean(off**2))),
-                    }
-                    row |= {"largest": float(np.max(np.abs(off)))}
-                    row["stated"] = float(np.nanmedian(stated))
+                    row |= {"places": int(part.sum()), "mean": float(np.mean(off)), "rms": rms(off)}
+                    row |= {"largest": float(np.max(np.abs(off))), "stated": float(np.nanmedian(stated))}
                     yield row | {"within": float(np.mean(within[part]))}
 
 

@@ -24,13 +24,7 @@ BODIES: dict[str, tuple[Any, tuple[float, float, float], str]] = {
 BOUNDARIES: tuple[Literal["soft", "hard", "pec"], ...] = ("soft", "hard", "pec")
 K = 15.0
 BISTATIC_K = 20.0
-SPAN, BISTATIC_SPAN = 30.0, 50.0
-"""Decibels of a colour bar; over the sphere a map has its own, since soft waves fall off by 50 dB more."""
-RAYS = 256
-"""Of each incidence."""
 GREY = "#8a9096"
-ROUND = 6.6
-"""Of the rays: once round."""
 PANELS = (5.0, 30.0, 100.0)
 """Values of ka at the ends of the panels."""
 
@@ -48,13 +42,12 @@ def cross_section(path: Path, quick: bool) -> dict[str, Any]:
     cards: dict[str, dict[str, Any]] = {}
     for name, (body, *_) in BODIES.items():
         flow = cr.DirectFlow(body, rtol=1e-6)
-        found = cr.sweep_directions(flow, directions, wavenumbers=K, boundary=BOUNDARIES, n_rays=RAYS)
+        found = cr.sweep_directions(flow, directions, wavenumbers=K, boundary=BOUNDARIES)
         levels, bad = cross_sections(found), unresolved_of(found)
         near = found["incidence_status"].values == NEAR_SINGULAR
         maps[name] = levels, bad, near
         cards[name] = {
             "against_one_by_one_dB": agreement(found, flow, found.attrs["length"]),
-            "mirrored": {b: mirrored(levels[b], bad[b], shape) for b in BOUNDARIES},
             "unresolved": {b: float(np.sum(weights * bad[b])) for b in BOUNDARIES},
             "without_return": {b: float(np.sum(weights * np.isneginf(levels[b]))) for b in BOUNDARIES},
             "near_singular": int(near.sum()),
@@ -65,11 +58,7 @@ def cross_section(path: Path, quick: bool) -> dict[str, Any]:
     worst = max(max(card["against_one_by_one_dB"].values()) for card in cards.values())
     twisted = cards["twisted ellipsoid"]
     return {
-        "parameters": {
-            "bodies": [repr(body) for body, *_ in BODIES.values()],
-            "wavenumber": K,
-            "directions": list(shape),
-        },
+        "parameters": {"bodies": [repr(b) for b, *_ in BODIES.values()], "wavenumber": K, "directions": list(shape)},
         "error": {"field": cards},
         "headline": f"{len(directions)} directions of each body; within {worst:.2g} dB of one by one; of the twisted "
         f"ellipsoid {100 * twisted['unresolved']['hard']:.1f} % unresolved, {twisted['near_singular']} near singular",
@@ -106,7 +95,7 @@ def agreement(found: Any, flow: Any, length: float) -> dict[str, float]:
     levels, bad = cross_sections(found), unresolved_of(found)
     for row in rows:
         d = found["direction"].values[row]
-        fan = cr.launch(flow, cr.shadow_line(flow.body, d), length=length, n_rays=RAYS)
+        fan = cr.launch(flow, cr.shadow_line(flow.body, d), length=length, n_rays=256)
         for name in BOUNDARIES:
             far = cr.far_field(fan, -d, wavenumber=K, boundary=name, method="rays").creeping
             value = np.sqrt(0.5 * np.sum(np.abs(far) ** 2)) if name == "pec" else np.abs(far[0])
@@ -129,25 +118,6 @@ def mean_level(levels: FloatArray, weights: FloatArray) -> float:
     return float(10 * np.log10(np.average(10 ** (levels / 10), weights=weights)))
 
 
-def mirrored(levels: FloatArray, bad: BoolArray, shape: tuple[int, int]) -> dict[str, float]:
-    """Differences, dB, between directions that x = 0 and z = 0 exchange, the planes of symmetry of both bodies.
-
-    Where both are resolved, the largest and the share above 0.1; "one_sided" is the share resolved on one side only.
-    """
-    # nothing, -inf, is alike on both sides or very different
-    L, ok = np.maximum(levels, -300.0).reshape(shape), ~bad.reshape(shape)
-    largest, above, one_sided = 0.0, 0.0, 0.0
-    i, j = np.indices(shape)
-    for image in ((i, shape[1] // 2 - 1 - j), (-1 - i, j)):
-        # of x: φ to π - φ, of z: θ to π - θ; indices below 0 count from the end
-        there = ok[image]
-        gap = np.where(ok & there, np.abs(L - L[image]), 0.0)
-        largest = max(largest, float(gap.max()))
-        above += 0.5 * float(np.mean(gap > 0.1))
-        one_sided += 0.5 * float(np.mean(ok ^ there))
-    return {"largest_dB": largest, "above_0.1_dB": above, "one_sided": one_sided}
-
-
 def _mollweide(path: Path, shape: tuple[int, int], maps: dict[str, Any], dpi: int) -> None:
     from matplotlib.colors import ListedColormap
     from matplotlib.lines import Line2D
@@ -161,7 +131,8 @@ def _mollweide(path: Path, shape: tuple[int, int], maps: dict[str, Any], dpi: in
             # caustics that are not told, a few cells, must not set the range
             known = levels[boundary][~bad[boundary] & np.isfinite(levels[boundary])]
             high = float(np.quantile(known, 0.998))
-            low = max(float(np.min(known)), high - SPAN)
+            # each map has its own 30 dB: soft waves fall off by 50 dB more
+            low = max(float(np.min(known)), high - 30.0)
             ax = figure.add_axes((0.05 + 0.49 * column, 0.705 - 0.305 * row, 0.36, 0.235), projection="mollweide")
             # nothing returns: the colour of what is below the range
             level = np.maximum(levels[boundary], low - 1).reshape(shape)
@@ -172,11 +143,8 @@ def _mollweide(path: Path, shape: tuple[int, int], maps: dict[str, Any], dpi: in
             middle = 0.5 * (phi[u] + phi[u + 1]), 0.5 * (latitude[v] + latitude[v + 1])
             ax.plot(*middle, "o", ms=1.6, color="white", mec="black", mew=0.2)
             _angles(ax)
-            ax.set_title(
-                f"{'abcdef'[2 * row + column]}  {'conductor' if boundary == 'pec' else boundary}: {name}",
-                fontsize=9,
-                pad=4,
-            )
+            kind = "conductor" if boundary == "pec" else boundary
+            ax.set_title(f"{'abcdef'[2 * row + column]}  {kind}: {name}", fontsize=9, pad=4)
             bar = figure.add_axes((0.425 + 0.49 * column, 0.735 - 0.305 * row, 0.012, 0.175))
             figure.colorbar(drawn, cax=bar, extend="both")
             bar.tick_params(labelsize=7, direction="in", width=0.5, pad=2)
@@ -286,8 +254,7 @@ def _squares(path: Path, found: dict[str, tuple[ComplexArray, BoolArray]], dpi: 
     box: dict[str, Any] = {"extent": (0, 360, 0, 360), "origin": "lower", "interpolation": "nearest", "aspect": "equal"}
     for column, (name, (total, resolved)) in enumerate(found.items()):
         ax = figure.add_axes((0.075 + 0.43 * column, 0.17, 0.39, 0.72))
-        shown = np.maximum(levels[name], high - BISTATIC_SPAN - 1)
-        drawn = ax.imshow(shown, cmap="viridis", vmin=high - BISTATIC_SPAN, vmax=high, **box)
+        drawn = ax.imshow(np.maximum(levels[name], high - 51), cmap="viridis", vmin=high - 50, vmax=high, **box)
         veil = np.concatenate([np.broadcast_to(to_rgb(GREY), (*total.shape, 3)), 0.75 * ~resolved[..., None]], axis=2)
         ax.imshow(veil, **box)
         ax.set_xticks(range(0, 361, 90))
@@ -307,15 +274,13 @@ def _squares(path: Path, found: dict[str, tuple[ComplexArray, BoolArray]], dpi: 
 
 
 def backscatter(ka: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """Creeping and whole field of the unit sphere in the direction the wave came from: (n,) -> (n, 2, 2) each."""
+    """Creeping and whole field of the unit sphere in the direction the wave came from: (n,) -> (n, 2, 2) each.
+
+    Rays go once round, and a little more.
+    """
     flow = cr.DirectFlow(sc.Sphere(), rtol=1e-8)
-    found = cr.sweep_directions(flow, [(0, 0, 1)], wavenumbers=ka, boundary="pec", length=ROUND)
+    found = cr.sweep_directions(flow, [(0, 0, 1)], wavenumbers=ka, boundary="pec", length=6.6)
     return found["creeping_pec"].values[0], found["total_pec"].values[0]
-
-
-def exact_backscatter(ka: FloatArray) -> ComplexArray:
-    """Mie's series (n,), E across the plane of scattering; in it the sign is opposite."""
-    return np.array([sphere.pec_far_field(k, 1.0, [-1.0])[0][0] for k in ka])
 
 
 def peaks(ka: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -338,13 +303,15 @@ def beat(ka: FloatArray, found: FloatArray, exact: FloatArray) -> dict[str, Any]
     if card["peaks"] != card["exact_peaks"] or len(low[0]) != len(low_exact[0]):
         return card
     period = np.gradient(theirs[0])
-    degrees = 360 * (mine[0] - theirs[0]) / period
+    degrees = np.abs(360 * (mine[0] - theirs[0]) / period)
     swing = (mine[1][:n] + low[1][:n]) / (theirs[1][:n] + low_exact[1][:n])
-    card |= {"period_of_ka": float(np.median(period)), "largest_shift_degrees": float(np.max(np.abs(degrees)))}
-    late = theirs[0] > 10
-    card |= {"largest_shift_degrees_beyond_10": float(np.max(np.abs(degrees[late])))}
-    card |= {"median_shift_degrees": float(np.median(np.abs(degrees)))}
-    return card | {"largest_error_of_swing": float(np.max(np.abs(swing - 1)))}
+    return card | {
+        "period_of_ka": float(np.median(period)),
+        "largest_shift_degrees": float(np.max(degrees)),
+        "largest_shift_degrees_beyond_10": float(np.max(degrees[theirs[0] > 10])),
+        "median_shift_degrees": float(np.median(degrees)),
+        "largest_error_of_swing": float(np.max(np.abs(swing - 1))),
+    }
 
 
 def sphere_rcs(path: Path, quick: bool) -> dict[str, Any]:
@@ -355,7 +322,8 @@ def sphere_rcs(path: Path, quick: bool) -> dict[str, Any]:
     """
     ka = np.arange(PANELS[0], (40.0 if quick else PANELS[-1]) + 1e-9, 0.1 if quick else 0.05)
     creeping, total = backscatter(ka)
-    exact = exact_backscatter(ka)
+    # of Mie's series E across the plane of scattering; in it the sign is opposite
+    exact = np.array([sphere.pec_far_field(k, 1.0, [-1.0])[0][0] for k in ka])
     sigma, sigma_exact = 4 * np.abs(total[:, 0, 0]) ** 2, 4 * np.abs(exact) ** 2
     error = np.abs(sigma / sigma_exact - 1)
     # on a sphere both polarisations are equal, but for the sign of e
@@ -373,7 +341,7 @@ def sphere_rcs(path: Path, quick: bool) -> dict[str, Any]:
         **beat(ka, sigma, sigma_exact),
     }
     return {
-        "parameters": {"body": "Sphere()", "boundary": "pec", "length": ROUND, "count": len(ka)}
+        "parameters": {"body": "Sphere()", "boundary": "pec", "count": len(ka)}
         | {"ka": [float(ka[0]), round(float(ka[-1]), 6)]},
         "error": {"field": field},
         "headline": f"σ within {100 * field['cross_section_largest_beyond_10']:.2f} % of Mie's series beyond ka = 10 "

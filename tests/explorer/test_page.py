@@ -246,7 +246,7 @@ def test_the_cut_follows_the_hand_by_the_t_matrix_once_it_is_made(page, monkeypa
     monkeypatch.setattr("creeping.explorer.frames.PATIENCE", 20.0)
     page.ask(wavenumber=3.0)
     until(lambda: "by the T-matrix" in page.cut.content, lambda: page.status.content)
-    monkeypatch.setattr("creeping.explorer.page.refined_view", lambda *_: None)
+    monkeypatch.setattr("creeping.explorer.frames.refined_view", lambda *_: None)
     before = page.cut.content
     page.ask(theta=77.0)
     angles = np.arange(-180.0, 181.0, 2.0)

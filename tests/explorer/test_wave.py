@@ -107,7 +107,7 @@ def page():
 
 
 def test_playing_computes_no_field(page, monkeypatch):
-    from creeping.explorer import page as module
+    from creeping.explorer import frames as module
 
     until(lambda: page.found.content, lambda: page.status.content)
 

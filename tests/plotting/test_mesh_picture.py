@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from creeping.plotting.pictures import MESH_INCHES, MeshValues, mesh_picture
+from creeping.plotting.pictures import MeshValues, mesh_picture
 from tests.exact_meshes import geodesic_sphere
 
 
@@ -28,7 +28,7 @@ def test_sizes(tmp_path, ball, count, dpi):
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG\r\n")
     shape = pixels(tmp_path / "a.png").shape
     # the figure may be cut by a pixel
-    np.testing.assert_allclose(shape[:2], (round(MESH_INCHES[1] * dpi) * count, round(MESH_INCHES[0] * dpi)), atol=1)
+    np.testing.assert_allclose(shape[:2], (round(3.4 * dpi) * count, round(7.2 * dpi)), atol=1)
 
 
 def share(image, low, high):

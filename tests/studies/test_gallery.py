@@ -17,8 +17,8 @@ import studies
 from creeping.commands.main import app
 from creeping.sweeping.study import parse_study
 from studies import __main__ as command
-from studies.gallery import building
-from studies.gallery.building import TASKS
+from studies.gallery import __main__ as building
+from studies.gallery.__main__ import TASKS
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted(building.PAGES.glob("*.md"))

@@ -7,7 +7,7 @@ import pytest
 
 import creeping
 import scatterers
-from studies.gallery.building import NOTEBOOKS, PAGES
+from studies.gallery.__main__ import NOTEBOOKS, PAGES
 
 SOURCES = sorted(NOTEBOOKS.glob("*.md"))
 _CELL = re.compile(r"^```\{code-cell\}\n(.*?)^```$", re.MULTILINE | re.DOTALL)
