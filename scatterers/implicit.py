@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from creeping._typing import ArrayLike, FloatArray, IntArray
+from creeping.storage.memory import within_budget
 from scatterers.body import SHARP, Crease, Piece, box_of, cached, no_charts, numbers, numbers_of, positive
 from scatterers.charts.samples import Samples
 from scatterers.charts.star import LevelBody, star_map
@@ -362,6 +363,9 @@ class Gridded(LevelBody):
 
 def _checked(samples: ArrayLike) -> FloatArray:
     """Samples as an array, or ValueError."""
+    # as numbers, their coefficients, and those half made
+    count = int(np.prod(np.shape(samples), dtype=float)) if hasattr(samples, "shape") else 0
+    within_budget(24.0 * count, f"a spline through {count} samples", "give fewer")
     try:
         nodes = np.ascontiguousarray(numbers(samples))
     except (TypeError, ValueError):

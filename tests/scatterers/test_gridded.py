@@ -256,3 +256,9 @@ SPOILT = np.where(np.arange(1000).reshape(10, 10, 10) == 345, np.nan, SAMPLES)
 def test_bad_input_is_named(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_samples_that_take_too_much_memory_are_refused_before_they_are_converted(monkeypatch):
+    monkeypatch.setenv("CREEPING_MEMORY", "100M")
+    with pytest.raises(ValueError, match=r"a spline through 8000000 samples would take 0.2 GB"):
+        sc.Gridded(np.broadcast_to(np.float32(1.0), (200, 200, 200)), [[-1.0] * 3, [1.0] * 3])
