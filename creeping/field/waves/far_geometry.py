@@ -41,7 +41,7 @@ from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays, free_ways
 from creeping.rays.specular import SpecularPoints, specular_points
 from creeping.rays.strips import Strip, strips_of
-from creeping.rays.tracer import TURN, RayTracer, rays_towards, same_within
+from creeping.rays.tracer import TURN, RaySearch, RayTracer, same_within
 from creeping.rays.transport import Flow, carried
 from creeping.shadow.attachment import LaunchPoints, occluded
 from creeping.shadow.line import ShadowLine, shares_of
@@ -260,8 +260,8 @@ class FarGeometry:
         long = fine[sample + 1] - fine[sample]
         begin = fine[sample] + along * long
         cell = np.stack([launch.spacing[which, ray], long], axis=1)
-        sought = self.direction[row], self.directions[row], near, begin, cell
-        one, found, moved = rays_towards(self.tracer, *sought)
+        search = RaySearch(self.tracer, self.direction[row], self.directions[row], near, begin, cell)
+        one, found = search.result()
         row, ray, cell, across, which = row[found], ray[found], cell[found], across[found, 0], which[found]
         arc = launch.arc_index
         same = arc[which] == arc[which, ray][:, None]
@@ -269,7 +269,7 @@ class FarGeometry:
             # of no rays at all there is no first one
             same = np.zeros((0, 1), dtype=bool)
         first, last = np.argmax(same, axis=1), same.shape[1] - 1 - np.argmax(same[:, ::-1], axis=1)
-        place = ray + across + moved
+        place = ray + across + search.moved[found]
         inside = (launch.closed[which, ray] == 1) | ((place >= first - 0.5) & (place <= last + 0.5))
         kept = np.flatnonzero(inside)
         starts, found_rays = one.starts[kept], one.rays[kept]
