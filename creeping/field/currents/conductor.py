@@ -167,7 +167,7 @@ def lit_vectors(
     lit: LitNodes, direction: FloatArray, electric: ComplexArray, wavenumber: float, order: int
 ) -> ComplexArray:
     """J of the lit side's expansion at its nodes, for incident E0 (3, p): (n, 3, p)."""
-    bright = lit_conductor(lit.cosine, lit.along, lit.across, lit.twist, lit.rate, lit.bend, wavenumber, order)
+    bright = lit_conductor(lit.ground, wavenumber, order)
     bright = bright * np.exp(1j * wavenumber * (lit.points @ direction))[:, None, None]
     h, e = amplitudes(lit.normals, lit.axes, direction, electric)
     b = np.cross(lit.normals, lit.axes)

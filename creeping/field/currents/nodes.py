@@ -24,7 +24,7 @@ import numpy as np
 from creeping._typing import BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.boundary import Boundary, fock_scale, slowest_decay
-from creeping.field.currents.lit import lit_currents
+from creeping.field.currents.lit import Ground, lit_currents
 from creeping.field.marching.fan_waves import fan_waves, march_alone, marchable, spread_out
 from creeping.field.waves.shed_wave import smoothstep
 from creeping.field.waves.surface import surface_waves
@@ -81,6 +81,11 @@ class LitNodes:
     bend: FloatArray
     axes: FloatArray
     twist: FloatArray
+
+    @property
+    def ground(self) -> Ground:
+        """What the currents depend on."""
+        return Ground(self.cosine, self.along, self.across, self.twist, self.rate, self.bend)
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,9 +267,8 @@ def lit_waves(
     """Wave at nodes of the lit side of a body of size ``extent``, L, by second and by first order (n,)."""
     along = direction + part.cosine[:, None] * part.normals
     here = kind.at(part.points, along, STEP * extent)
-    geometry = part.cosine, part.along, part.across, part.twist, part.rate, part.bend
     wave = np.exp(1j * k * (part.points @ direction))
-    second, first = (wave * lit_currents(*geometry, k, here, order) for order in (2, 1))
+    second, first = (wave * lit_currents(part.ground, k, here, order) for order in (2, 1))
     return second, first
 
 
