@@ -98,17 +98,6 @@ class MarchedRays:
     wavenumber: float
     profiles: RayProfiles
 
-    def __len__(self) -> int:
-        return len(self.s)
-
-    def __repr__(self) -> str:
-        counts = {code.name: int(np.sum(self.status == code)) for code in MarchStatus if np.any(self.status == code)}
-        return (
-            f"MarchedRays: {len(self)} rays, {int(np.sum(self.counts))} places, k = {self.wavenumber:g}\n"
-            f"  status: {counts}\n"
-            f"  largest misfit of a trace: {np.max(self.misfit, initial=0.0):.2g}"
-        )
-
     def at(self, ray: int, s: ArrayLike) -> ComplexArray:
         """Values (m,) of a ray at places (m,), L; 0 where it was not marched.
 
@@ -186,8 +175,9 @@ class _March:
         self.misfit = np.zeros(len(ends))
         self.status = plan.status.copy()
         self.reliable = plan.reliable.copy()
-        shares = [profiles.obliqueness(ray, 0.5 * (edges[1:] + edges[:-1])) for ray, edges in enumerate(self.edges)]
-        ways = [share * np.diff(edges) for share, edges in zip(shares, self.edges, strict=True)]
+        middles = [0.5 * (edges[1:] + edges[:-1]) for edges in self.edges]
+        leans = [profiles.value_of("lean", ray, at) for ray, at in enumerate(middles)]
+        ways = [np.diff(edges) / (1 + lean**2) for edges, lean in zip(self.edges, leans, strict=True)]
         # a joint may stand next to the end of a step
         sizes = np.maximum(np.round(k * np.concatenate(ways), 9), 1e-9)
         distinct, which = np.unique(sizes, return_inverse=True)
@@ -204,13 +194,15 @@ class _March:
         order = sorted(live, key=lambda ray: (hash(self.plan.specs[ray]), counts[ray]))
         blocks: list[list[int]] = []
         for ray in order:
-            fits = blocks and len(blocks[-1]) < LANES and self.plan.specs[blocks[-1][0]] == self.plan.specs[ray]
-            if fits:
-                blocks[-1].append(ray)
-            else:
-                blocks.append([ray])
-        if blocks:
-            in_threads(lambda part: self._march_blocks(blocks[part]), len(blocks), least=2, multiple=1, first=1)
+            if not blocks or len(blocks[-1]) == LANES or self.plan.specs[blocks[-1][0]] != self.plan.specs[ray]:
+                blocks.append([])
+            blocks[-1].append(ray)
+
+        def work(part: slice) -> None:
+            for block in blocks[part]:
+                self._march_block(block)
+
+        in_threads(work, len(blocks), least=2, multiple=1, first=1)
         return MarchedRays(
             s=self.s,
             values=self.values,
@@ -240,10 +232,6 @@ class _March:
                 parts.append(np.linspace(a, b, max(1, int(np.ceil((b - a) / step))) + 1)[1:])
             ways.append(np.concatenate(parts))
         return ways[0], ways[1]
-
-    def _march_blocks(self, blocks: list[list[int]]) -> None:
-        for block in blocks:
-            self._march_block(block)
 
     def _march_block(self, block: list[int]) -> None:
         """March one block of rays and keep what is on the surface."""
