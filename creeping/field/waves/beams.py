@@ -44,16 +44,13 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
-from creeping.field.arguments import fock_parameter
 from creeping.field.boundary import Boundary
-from creeping.field.results.point_result import FieldStatus
 from creeping.field.waves.far_geometry import fan_strips
 from creeping.field.waves.ray_sums import (
-    FADED,
     LOST,
     RaySum,
-    fan_decay,
     fold_share,
+    judged_sum,
     magnitude,
     merging_error,
     total_of,
@@ -340,32 +337,8 @@ def blended_sum(
     Where rays merge they err by shares of ``strength``, by themselves by shares of ``size`` (m,), which is bounded.
     ``part`` (m,) is the error of each wave as a share of it, 1 or more where there is none.
     """
-    values, rest = _blended(fan, shed, own, strength, size, eta, beams, wavenumber)
-    bounded = np.where(np.isfinite(part), np.minimum(part, 1.0), 1.0)
-    # at a focus more rays come than those that are found
-    sums = total_of(size, shed.observer, len(values))
-    field = magnitude(values, sums)
-    more = np.maximum(1.0, field / np.maximum(sums, 1e-300))
-    # and at one where all rays of a fan come their number says how dense it is, and no more
-    crowd = total_of(np.ones(len(size)), shed.observer, len(values)) > 8
-    more = np.where(crowd, np.minimum(more, 2 * field / np.maximum(sums, 1e-300)), more)
-    error = np.hypot(more * total_of(size * bounded, shed.observer, len(values)), rest)
-    return _judged(fan, shed, size, values, error, part >= 1, wavenumber, boundary)
-
-
-def _blended(
-    fan: RayFan,
-    shed: ShedRays,
-    own: ComplexArray,
-    strength: FloatArray,
-    size: FloatArray,
-    eta: FloatArray,
-    beams: tuple[ComplexArray, ComplexArray],
-    wavenumber: float,
-) -> tuple[ComplexArray, FloatArray]:
-    """The field (n, ...) of rays (m, ...) and of beams, and the error of merging."""
-    by_beams, others = beams
-    count, observer = len(by_beams), shed.observer
+    (by_beams, others), observer = beams, shed.observer
+    count = len(by_beams)
     plain = np.zeros(count)
     by_rays = total_of(own, observer, count)
     e_b = np.sqrt(total_of((size * (LEAST + np.minimum(VARIES * eta, 1.0))) ** 2, observer, count))
@@ -379,42 +352,23 @@ def _blended(
     both = e_r**2 + e_b**2
     with np.errstate(invalid="ignore", divide="ignore"):
         beta = wide(np.where(both > 0, e_r**2 / both, 0.0), by_beams)
+        # the error of merging
         rest = np.where(both > 0, e_r * e_b / np.sqrt(both), 0.0)
-    return np.asarray((1 - beta) * by_rays + beta * by_beams), rest
-
-
-def _judged(
-    fan: RayFan,
-    shed: ShedRays,
-    size: FloatArray,
-    values: ComplexArray,
-    error: FloatArray,
-    lacking: BoolArray,
-    k: float,
-    boundary: Boundary,
-) -> RaySum:
-    """The sum with its status: what ends with the fan, and what no wave is known of."""
-    count, observer = len(values), shed.observer
-    decay, end = fan_decay(fan, k, boundary)
-    xi = fock_parameter(shed.rays, k)
-    strength = total_of(size, observer, count)
-    lost = total_of(np.where(size > 0, size * np.exp(-decay * np.maximum(end - xi, 0.0)), 0.0), observer, count)
+    values = np.asarray((1 - beta) * by_rays + beta * by_beams)
+    bounded = np.where(np.isfinite(part), np.minimum(part, 1.0), 1.0)
+    # at a focus more rays come than those that are found
+    sums = total_of(size, observer, count)
+    field = magnitude(values, sums)
+    more = np.maximum(1.0, field / np.maximum(sums, 1e-300))
+    # and at one where all rays of a fan come their number says how dense it is, and no more
+    crowd = total_of(np.ones(len(size)), observer, count) > 8
+    more = np.where(crowd, np.minimum(more, 2 * field / np.maximum(sums, 1e-300)), more)
+    error = np.hypot(more * total_of(size * bounded, observer, count), rest)
     # a ray without a wave, or with one that errs by its size
-    none = np.zeros(count, dtype=bool)
-    none[observer[lacking & (size == 0)]] = True
-    unknown = none | (total_of(np.where(lacking, size, 0.0), observer, count) > LOST * strength)
-    status = np.select(
-        [unknown, strength == 0, lost > LOST * strength],
-        [
-            FieldStatus.DETACHED,
-            FieldStatus.TRUNCATED if np.exp(-decay * end) > FADED else FieldStatus.NO_RAY,
-            FieldStatus.TRUNCATED,
-        ],
-        FieldStatus.OK,
-    )
-    error = np.hypot(error, lost)
-    error = np.where(status == FieldStatus.OK, error, np.fmax(error, strength))
-    return RaySum(values, error, status.astype(np.int64), total_of(np.exp(-decay * xi), observer, count))
+    lacking = part >= 1
+    unknown = total_of(np.where(lacking, size, 0.0), observer, count) > LOST * sums
+    unknown[observer[lacking & (size == 0)]] = True
+    return judged_sum(fan, shed, size, values, error, (unknown, np.zeros(count, bool)), wavenumber, boundary)
 
 
 def wide(values: FloatArray | BoolArray | ComplexArray, like: ComplexArray) -> Any:

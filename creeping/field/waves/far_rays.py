@@ -412,8 +412,8 @@ def sheets_of(geometry: FarGeometry, parts: list[Parts]) -> Sheets:
     )
     waves = np.concatenate(
         [
-            np.concatenate([_columns(one.shed_waves, len(shed.observer)) for one in parts], axis=1),
-            np.concatenate([_columns(one.specular_waves, len(points)) for one in parts], axis=1),
+            np.concatenate([_columns(one.shed_waves, len(shed.observer), _width(one)) for one in parts], axis=1),
+            np.concatenate([_columns(one.specular_waves, len(points), _width(one)) for one in parts], axis=1),
         ]
     )
     numbers = np.concatenate([np.full(_width(one), one.wavenumber) for one in parts])
@@ -439,10 +439,6 @@ def _width(parts: Parts) -> int:
     return 4 if parts.vector else 1
 
 
-def _columns(waves: list[ComplexArray], count: int) -> ComplexArray:
-    """Contributions of both polarisations of a conductor, or of the one scalar problem, as columns (count, ...)."""
-    return np.asarray(np.sum(waves, axis=0, dtype=complex).reshape(count, -1) if count else np.zeros((0, _size(waves))))
-
-
-def _size(waves: list[ComplexArray]) -> int:
-    return int(np.prod(waves[0].shape[1:], dtype=int))
+def _columns(waves: list[ComplexArray], count: int, width: int) -> ComplexArray:
+    """Contributions of both polarisations of a conductor, or of the one scalar problem, as columns (count, width)."""
+    return np.asarray(np.sum(waves, axis=0, dtype=complex).reshape(count, width))
