@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize.elementwise import find_root
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geometry.incident import headings
@@ -80,22 +81,13 @@ def _cusps(curves: Curves) -> tuple[IntArray, FloatArray, BoolArray]:
     node = np.flatnonzero(changes)
     where = curves.own[node]
     cell = node - curves.first[where]
-    # the Illinois rule: an end that is kept twice has its value halved
-    low, high, last = np.zeros(len(node)), np.ones(len(node)), np.zeros(len(node))
-    at_low, at_high, u = a[node], b[node], np.zeros(len(node))
-    u[at_high == 0] = 1.0
-    for _ in range(40 if len(node) else 0):
-        open_ = (high - low > 1e-13) & (at_low != 0) & (at_high != 0)
-        if not open_.any():
-            break
-        u = np.where(open_, (low * at_high - high * at_low) / np.where(open_, at_high - at_low, 1.0), u)
-        value = curves.values_at(a[:, None], where, cell + u)[:, 0]
-        up = (value > 0) == (at_high > 0)
-        at_low = np.where(open_ & up & (last == 1), 0.5 * at_low, np.where(open_ & ~up, value, at_low))
-        at_high = np.where(open_ & ~up & (last == -1), 0.5 * at_high, np.where(open_ & up, value, at_high))
-        low, high = np.where(open_ & ~up, u, low), np.where(open_ & up, u, high)
-        last = np.where(up, 1, -1)
-    return where, cell + u, hidden
+
+    def value(u: FloatArray, curve: IntArray, at: IntArray) -> FloatArray:
+        return curves.values_at(a[:, None], curve, at + u)[:, 0]
+
+    ends = np.zeros(len(node)), np.ones(len(node))
+    found = find_root(value, ends, args=(where, cell), tolerances={"xatol": 1e-13}).x if len(node) else ends[0]
+    return where, cell + found, hidden
 
 
 class Picture(NamedTuple):
