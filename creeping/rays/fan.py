@@ -113,11 +113,6 @@ class RayFan(DrawnOnBody):
     flow: Flow
 
     @property
-    def flow_error(self) -> ErrorEstimate | None:
-        """Error stated by the flow: of one step of a phase map; for direct integration None unless measured."""
-        return self.flow.error
-
-    @property
     def length(self) -> float:
         """Travel time of the last step."""
         return float(self.travel_time[-1])

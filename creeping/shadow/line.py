@@ -433,8 +433,8 @@ def lines_together(
         near[row] = line.singular_distance
         launches.append(line.launch_points(n_rays, "all" if every else "attached"))
     launched = LaunchPoints.joined([LaunchPoints.blank(directions[:0], n_rays), *launches])
-    curves, length, error, attached, occluded, concave = numbers.T
     launched = replace(launched, waves=directions)
+    curves, length, error, attached, occluded, concave = numbers.T
     return ShadowLines(directions, status, curves, length, error, attached, occluded, concave, near, launched)
 
 
