@@ -29,8 +29,6 @@ HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "ghz": 1e9, "thz": 1e12}
 METRES = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9}
 """Units of wavelength, m."""
 
-UNITS = ((1e9, "GHz"), (1e6, "MHz"), (1e3, "kHz"), (1.0, "Hz"))
-"""Units in which frequencies are shown, the largest first."""
 WINDOWS = ("hann", "none", "taylor")
 PADDING = 8
 """Samples for each one that the band resolves."""
@@ -104,7 +102,9 @@ def frequency(wavenumber: ArrayLike, *, sound_speed: float | None = None) -> flo
     return float(found) if found.ndim == 0 else np.asarray(found)
 
 
-def suited(value: float, units: tuple[tuple[float, str], ...] = UNITS) -> tuple[float, str]:
+def suited(
+    value: float, units: tuple[tuple[float, str], ...] = ((1e9, "GHz"), (1e6, "MHz"), (1e3, "kHz"), (1.0, "Hz"))
+) -> tuple[float, str]:
     """Size and name of the largest unit that a value reaches; of the smallest if it reaches none.
 
     Examples

@@ -337,7 +337,7 @@ class ShadowLines(Rows):
     launch: LaunchPoints
 
 
-def shadow_lines(body: Surface, directions: FloatArray, n_rays: int, *, every: bool = False) -> ShadowLines:
+def shadow_lines(body: Surface, directions: FloatArray, n_rays: int) -> ShadowLines:
     """Shadow lines of unit directions.
 
     Parameters
@@ -346,8 +346,6 @@ def shadow_lines(body: Surface, directions: FloatArray, n_rays: int, *, every: b
     directions : (n, 3)
     n_rays : int
         Launch points of each, shared among the attached arcs by length and evenly spaced on each.
-    every : bool
-        Launch points on the whole line instead.
 
     Returns
     -------
@@ -359,7 +357,13 @@ def shadow_lines(body: Surface, directions: FloatArray, n_rays: int, *, every: b
         If F = 0 has no closed triangulation in its bounds.
     """
     if is_piecewise(body):
-        return _one_by_one(body, np.asarray(directions, dtype=float), n_rays, every)
+        lines: list[ShadowLine | None] = []
+        for direction in directions:
+            try:
+                lines.append(shadow_line(body, direction, n_points=16))
+            except SingularIncidenceError:
+                lines.append(None)
+        return lines_together(np.asarray(directions, dtype=float), lines, n_rays)
     directions = np.ascontiguousarray(directions, dtype=float)
     waves, numbers = rows_of(directions), np.full((len(directions), 6), np.nan)
     launch = LaunchPoints.blank(directions, n_rays)
@@ -367,7 +371,7 @@ def shadow_lines(body: Surface, directions: FloatArray, n_rays: int, *, every: b
     def take(rows: IntArray, nodes: Sequence[LineNodes]) -> BoolArray:
         """Fill in what is known of some lines; whether it is certain (rows,)."""
         curves = Curves.of(waves[rows], nodes)
-        found = finished(body, curves, n_rays, every=every)
+        found = finished(body, curves, n_rays)
         numbers[rows, 0], numbers[rows, 1], numbers[rows, 3:] = curves.counts, curves.lengths, found.shares
         numbers[rows, 2] = [one.error for one in nodes]
         launch.put(rows, found.launch)
@@ -417,9 +421,7 @@ def _on_meshes(
     return status, v
 
 
-def lines_together(
-    directions: FloatArray, lines: Sequence[ShadowLine | None], n_rays: int, *, every: bool = False
-) -> ShadowLines:
+def lines_together(directions: FloatArray, lines: Sequence[ShadowLine | None], n_rays: int) -> ShadowLines:
     """Lines of unit directions (n, 3) that were found one by one, None where one crosses itself; as `shadow_lines`."""
     n = len(directions)
     numbers, status = np.full((n, 6), np.nan), np.full(n, SINGULAR, np.int8)
@@ -431,19 +433,8 @@ def lines_together(
         shares = line.fractions.values()
         numbers[row], status[row] = (len(line.curves), line.length, line.nodes.error, *shares), OK
         near[row] = line.singular_distance
-        launches.append(line.launch_points(n_rays, "all" if every else "attached"))
+        launches.append(line.launch_points(n_rays))
     launched = LaunchPoints.joined([LaunchPoints.blank(directions[:0], n_rays), *launches])
     launched = replace(launched, waves=directions)
     curves, length, error, attached, occluded, concave = numbers.T
     return ShadowLines(directions, status, curves, length, error, attached, occluded, concave, near, launched)
-
-
-def _one_by_one(body: Surface, directions: FloatArray, n_rays: int, every: bool) -> ShadowLines:
-    """Lines of a body with creases, each by itself."""
-    lines: list[ShadowLine | None] = []
-    for direction in directions:
-        try:
-            lines.append(shadow_line(body, direction, n_points=16))
-        except SingularIncidenceError:
-            lines.append(None)
-    return lines_together(directions, lines, n_rays, every=every)

@@ -20,6 +20,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
@@ -292,17 +293,24 @@ def _runs(
 ) -> list[list[tuple[FloatArray, float]]]:
     """Runs of the parts of one edge on the line, each the ends (2, 3) and the length of parts one after the other."""
     s = [unit_normals(side, x) @ direction + EDGE_ON for side in sides]
+    long = np.linalg.norm(np.diff(x, axis=0), axis=1)
+    # ascending even where two points are one
+    t = np.append(0.0, np.cumsum(np.maximum(long, 1e-12 * long.sum())))
+    curve, (points, weights) = CubicHermiteSpline(t, x, e), gauss_rule(5)
     runs: list[list[tuple[FloatArray, float]]] = []
+
+    def off(at: float, side: Any) -> float:
+        return float(unit_normals(side, curve([at]))[0] @ direction + EDGE_ON)
+
     for k in np.flatnonzero(is_convex[:-1] & is_convex[1:]):
-        ends = x[k : k + 2], e[k : k + 2]
-        cuts = [_cut(*ends, side, direction) for side, v in zip(sides, s, strict=True) if (v[k] < 0) != (v[k + 1] < 0)]
-        shares = [0.0, *sorted(cuts), 1.0]
-        for low, high in pairwise(shares):
-            middle = _cubic(*ends, np.array([0.5 * (low + high)]))
-            one, two = (unit_normals(side, middle)[0] @ direction < -EDGE_ON for side in sides)
+        crossed = [side for side, v in zip(sides, s, strict=True) if (v[k] < 0) != (v[k + 1] < 0)]
+        cuts = sorted(brentq(off, t[k], t[k + 1], args=(side,), xtol=1e-12 * (t[k + 1] - t[k])) for side in crossed)
+        for low, high in pairwise([t[k], *cuts, t[k + 1]]):
+            one, two = (off(0.5 * (low + high), side) < 0 for side in sides)
             if one == two or not high > low:
                 continue
-            part = _cubic(*ends, np.array([low, high])), _length(*ends, low, high)
+            slopes = np.linalg.norm(curve(low + (high - low) * points, 1), axis=1)
+            part = curve([low, high]), float((high - low) * np.sum(weights * slopes))
             if runs and _meet(runs[-1][-1], part):
                 runs[-1].append(part)
             else:
@@ -314,24 +322,3 @@ def _runs(
 
 def _meet(before: tuple[FloatArray, float], after: tuple[FloatArray, float]) -> bool:
     return bool(np.linalg.norm(before[0][-1] - after[0][0]) <= 1e-9 * (before[1] + after[1]))
-
-
-def _cut(x: FloatArray, e: FloatArray, side: Any, direction: FloatArray) -> float:
-    """Share of a segment at which n.d of one side changes its sign."""
-    return float(brentq(lambda u: unit_normals(side, _cubic(x, e, np.array([u])))[0] @ direction + EDGE_ON, 0.0, 1.0))
-
-
-def _cubic(x: FloatArray, e: FloatArray, u: FloatArray) -> FloatArray:
-    """Points at shares u (n,) of the cubic between two points with unit tangents: (n, 3), L."""
-    h, v = float(np.linalg.norm(x[1] - x[0])), u[:, None]
-    at = (1 - v) ** 2 * (1 + 2 * v) * x[0] + v**2 * (3 - 2 * v) * x[1]
-    return np.asarray(at + h * v * (1 - v) * ((1 - v) * e[0] - v * e[1]))
-
-
-def _length(x: FloatArray, e: FloatArray, low: float, high: float) -> float:
-    """Length of the cubic from a share to another, L."""
-    points, weights = gauss_rule(5)
-    u = (low + (high - low) * points)[:, None]
-    chord, h = x[1] - x[0], float(np.linalg.norm(x[1] - x[0]))
-    slope = 6 * u * (1 - u) * chord + h * ((1 - u) * (1 - 3 * u) * e[0] + u * (3 * u - 2) * e[1])
-    return float((high - low) * np.sum(weights * np.linalg.norm(slope, axis=1)))

@@ -227,8 +227,8 @@ def beam_sums(
     fan: RayFan,
     waves: StripWaves,
     points: FloatArray,
-    factors: tuple[float, ...] = (1.0,),
-    components: Components | None = None,
+    factors: tuple[float, ...],
+    components: Components | None,
 ) -> list[BeamSums]:
     """Beams of each eps = factor WIDTH/a at points of the body (n, 3), L; those of a vector have ``components``."""
     sums: list[list[ComplexArray]] = [[] for _ in factors]
@@ -305,7 +305,7 @@ def beams_beside_rays(
     points: FloatArray,
     own: ComplexArray,
     share: FloatArray,
-    components: Components | None = None,
+    components: Components | None,
 ) -> tuple[ComplexArray, ComplexArray]:
     """Sums of beams of both widths at points (n, 3), the waves ``own`` (m, ...) of young rays with them: (n, ...)."""
     near, clear = _apart_from_line(fan, shed, waves.wavenumber, len(points))
