@@ -37,7 +37,7 @@ from creeping.shadow.meshes import LineMeshes, clearance, critical_distances, ju
 from creeping.shadow.panels import PanelCurve
 from creeping.shadow.piecewise import EdgePart, launched_from, piecewise_curves
 from creeping.shadow.refinement import FORBIDDEN, followed
-from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, OK, SINGULAR, STATUSES
+from creeping.shadow.status import STATUSES, LineStatus
 from creeping.storage.memory import within_budget
 
 
@@ -219,9 +219,9 @@ def shadow_line(
     status, distances = _on_meshes(body, row, take)
     code, distance = int(status[0]), float(distances[0])
     panels: tuple[PanelCurve, ...] = ()
-    if code != OK:
+    if code != LineStatus.OK:
         exact, panels, distance = followed(body, d, prepared(body).coarsest)
-        if code == NEAR_SINGULAR and len(lines[-1][0].spacing) == len(panels):
+        if code == LineStatus.NEAR_SINGULAR and len(lines[-1][0].spacing) == len(panels):
             # the meshes had the right number of curves: the line is theirs, as in a sweep
             panels = ()
         else:
@@ -378,13 +378,13 @@ def shadow_lines(body: Surface, directions: FloatArray, n_rays: int) -> ShadowLi
         return found.certain
 
     status, v = _on_meshes(body, waves, take)
-    for row in np.flatnonzero(status == FOLLOWED):
+    for row in np.flatnonzero(status == LineStatus.FOLLOWED):
         numbers[row] = np.nan
         launch.put(np.array([row]), LaunchPoints.blank(directions[[row]], n_rays))
         try:
             nodes, _, v[row] = followed(body, directions[row], prepared(body).coarsest)
         except SingularIncidenceError as refused:
-            status[row], v[row] = SINGULAR, float(getattr(refused, "distance", 0.0))
+            status[row], v[row] = LineStatus.SINGULAR, float(getattr(refused, "distance", 0.0))
             continue
         take(np.array([row]), [nodes])
     curves, length, error, attached, occluded, concave = numbers.T
@@ -399,7 +399,7 @@ def _on_meshes(
     ``take`` is given the rows (m,) of lines and their nodes on each mesh, and says whether they are certain (m,).
     """
     n, meshes, v = len(waves), prepared(body), critical_distances(body, waves)
-    status, certain = np.full(n, SINGULAR, np.int8), np.zeros(n, dtype=bool)
+    status, certain = np.full(n, LineStatus.SINGULAR, np.int8), np.zeros(n, dtype=bool)
     rows = np.flatnonzero(v >= FORBIDDEN)
     for tier in range(LineMeshes.count):
         if not len(rows):
@@ -424,14 +424,14 @@ def _on_meshes(
 def lines_together(directions: FloatArray, lines: Sequence[ShadowLine | None], n_rays: int) -> ShadowLines:
     """Lines of unit directions (n, 3) that were found one by one, None where one crosses itself; as `shadow_lines`."""
     n = len(directions)
-    numbers, status = np.full((n, 6), np.nan), np.full(n, SINGULAR, np.int8)
+    numbers, status = np.full((n, 6), np.nan), np.full(n, LineStatus.SINGULAR, np.int8)
     near, launches = np.zeros(n), []
     for row, (direction, line) in enumerate(zip(directions, lines, strict=True)):
         if line is None:
             launches.append(launched_from((), [], direction, n_rays))
             continue
         shares = line.fractions.values()
-        numbers[row], status[row] = (len(line.curves), line.length, line.nodes.error, *shares), OK
+        numbers[row], status[row] = (len(line.curves), line.length, line.nodes.error, *shares), LineStatus.OK
         near[row] = line.singular_distance
         launches.append(line.launch_points(n_rays))
     launched = LaunchPoints.joined([LaunchPoints.blank(directions[:0], n_rays), *launches])

@@ -25,7 +25,7 @@ from creeping.geometry.triangulation import Triangulation, triangulate
 from creeping.kernels.threads import in_slices
 from creeping.shadow.curves import LineNodes
 from creeping.shadow.refinement import halved
-from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, OK
+from creeping.shadow.status import LineStatus
 
 TIERS = ((2_500, 512), (10_000, 2048), (40_000, 4096))
 """Vertices of the meshes, and nodes of a line on them."""
@@ -196,7 +196,7 @@ def judged(v: FloatArray, certain: BoolArray, turn: float, tier: int) -> tuple[B
     """
     far = v > turn * turn
     last = tier >= LineMeshes.count - 2
-    code = np.where(certain, np.where(far, OK, NEAR_SINGULAR), FOLLOWED)
+    code = np.where(certain, np.where(far, LineStatus.OK, LineStatus.NEAR_SINGULAR), LineStatus.FOLLOWED)
     onward = ~certain | (~far & (not last))
     return (onward if tier < LineMeshes.count - 1 else np.zeros_like(onward)), code
 

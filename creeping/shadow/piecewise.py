@@ -34,7 +34,7 @@ from creeping.shadow.curve import ShadowCurve
 from creeping.shadow.curves import moved_onto_lines
 from creeping.shadow.panels import LENGTH_TOLERANCE, PanelCurve, fit_panels
 from creeping.shadow.piece_curves import EDGE_ON, PieceCurve, curves_on, edge_on
-from creeping.shadow.status import ATTACHED, CONCAVE, NO_RAY, OCCLUDED, STATUSES
+from creeping.shadow.status import NO_RAY, STATUSES, PointState
 
 MEET = 1e-7
 """Distance of the ends of two curves, in body sizes, up to which they meet, and least length of a curve."""
@@ -128,7 +128,7 @@ def _finished(
         arclength=arclength,
         length=panels.length,
         error=LENGTH_TOLERANCE,
-        status=np.full(n_points, STATUSES[ATTACHED]),
+        status=np.full(n_points, STATUSES[PointState.ATTACHED]),
         curvature=curvature,
         arcs=arcs,
         nodes=points,
@@ -146,7 +146,7 @@ def _states(body: Any, piece: Any, direction: FloatArray, points: FloatArray) ->
     convex = moved_onto_lines(piece, direction, points, reach=0.0, steps=0).curvature > 0
     # asked a little off the body: along a straight generator F is 0 up to rounding
     hidden = occluded(body, points + 1e-9 * size(body) * unit_normals(piece, points), direction)
-    return np.where(convex, np.where(hidden, OCCLUDED, ATTACHED), CONCAVE)
+    return np.where(convex, np.where(hidden, PointState.OCCLUDED, PointState.ATTACHED), PointState.CONCAVE)
 
 
 def _arcs(body: Any, piece: Any, direction: FloatArray, panels: PanelCurve) -> tuple[tuple[float, float, str], ...]:

@@ -27,7 +27,7 @@ from creeping.shadow.curves import Curves
 from creeping.shadow.line import TOGETHER, shadow_lines
 from creeping.shadow.meshes import LineMeshes, critical_distances, judged, prepared, traced
 from creeping.shadow.refinement import FORBIDDEN
-from creeping.shadow.status import FOLLOWED, INCIDENCE_STATUSES, NEAR_SINGULAR, OK, SINGULAR, STATUSES
+from creeping.shadow.status import INCIDENCE_STATUSES, STATUSES, LineStatus
 from creeping.sweeping.request import sweep_request
 from creeping.sweeping.sweeper import Sweeper
 from studies import Row, main
@@ -195,7 +195,7 @@ def on_mesh(body: Any, directions: FloatArray, tier: int) -> Lines:
         certain[rows] = sure[rows - start] & found.certain
     v = critical_distances(body, directions)
     _, status = judged(v, certain, prepared(body).turn(tier), LineMeshes.count - 2)
-    status[v < FORBIDDEN] = SINGULAR
+    status[v < FORBIDDEN] = LineStatus.SINGULAR
     return Lines(status, numbers[:, 0], numbers[:, 1], numbers[:, 2:], v)
 
 
@@ -216,7 +216,7 @@ def independent(body: Any, directions: FloatArray) -> tuple[Lines, float]:
         try:
             line = cr.shadow_line(body, d)
         except cr.SingularIncidenceError:
-            lines.status[row] = SINGULAR
+            lines.status[row] = LineStatus.SINGULAR
             continue
         lines.curves[row], lines.length[row] = len(line.curves), line.length
         lines.shares[row] = [line.fractions[name] for name in STATUSES]
@@ -225,8 +225,8 @@ def independent(body: Any, directions: FloatArray) -> tuple[Lines, float]:
 
 def differences(found: Lines, exact: Lines) -> Row:
     """Lines that differ in the number of curves, and worst errors: of status OK, and of all (in brackets)."""
-    both = np.isfinite(found.length) & np.isfinite(exact.length) & (exact.status < SINGULAR)
-    certain = both & (found.status == OK)
+    both = np.isfinite(found.length) & np.isfinite(exact.length) & (exact.status < LineStatus.SINGULAR)
+    certain = both & (found.status == LineStatus.OK)
     length = np.abs(found.length / np.where(both, exact.length, 1.0) - 1)
     share = np.abs(found.shares - exact.shares)
     row: Row = {}
@@ -246,10 +246,10 @@ def measured(name: str, count: int, every: int) -> tuple[Row, Row, Row]:
     seconds, meshes = (
         seconds_of(call) / count for call in (partial(swept, shape, directions), partial(on_mesh, shape, directions, 0))
     )
-    second = int(np.sum(on_mesh(shape, directions, 0).status != OK))
-    third = int(np.sum(on_mesh(shape, directions, 1).status != OK))
+    second = int(np.sum(on_mesh(shape, directions, 0).status != LineStatus.OK))
+    third = int(np.sum(on_mesh(shape, directions, 1).status != LineStatus.OK))
     first: Row = {"body": name, "us a line": 1e6 * seconds, "on the first mesh": 1e6 * meshes}
-    for code in (OK, NEAR_SINGULAR, FOLLOWED, SINGULAR):
+    for code in (LineStatus.OK, LineStatus.NEAR_SINGULAR, LineStatus.FOLLOWED, LineStatus.SINGULAR):
         first[INCIDENCE_STATUSES[code].split(":")[0]] = int(np.sum(found.status == code))
     least = np.min(found.singular_distance)
     first |= {"need mesh 2": second, "need mesh 3": third}
@@ -257,7 +257,7 @@ def measured(name: str, count: int, every: int) -> tuple[Row, Row, Row]:
     first |= {"curves seen": " ".join(map(str, counts)), "least v": float(least) if np.isfinite(least) else np.nan}
     exact = on_mesh(shape, directions, 2)
     # what even the finest mesh is not certain of is no reference
-    exact.length[exact.status == FOLLOWED] = np.nan
+    exact.length[exact.status == LineStatus.FOLLOWED] = np.nan
     one_by_one, each = independent(shape, directions[::every])
     few = Lines(*(values[::every] for values in found))
     against = {"body": name, "s a line": each, **differences(few, one_by_one)}

@@ -38,7 +38,7 @@ from creeping.rays.reach import ray_length
 from creeping.rays.strips import ray_points
 from creeping.shadow.attachment import occluded
 from creeping.shadow.line import ShadowLine
-from creeping.shadow.status import ATTACHED
+from creeping.shadow.status import PointState
 
 PENUMBRA = (0.0, 0.6)
 """xi over which the rays take over from the lit side's nodes."""
@@ -176,7 +176,7 @@ def _out_of_the_wave(line: ShadowLine, points: FloatArray, dark: BoolArray) -> B
     # a point of the penumbra has the state of the line next to it
     on_line = np.concatenate([curve.points for curve in line.curves])
     state = np.concatenate([curve.state_at(curve.arclength) for curve in line.curves])
-    out[dark] = state[cKDTree(on_line).query(points[dark])[1]] != ATTACHED
+    out[dark] = state[cKDTree(on_line).query(points[dark])[1]] != PointState.ATTACHED
     return out
 
 

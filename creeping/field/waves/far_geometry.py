@@ -46,7 +46,7 @@ from creeping.rays.transport import Flow, carried
 from creeping.shadow.attachment import LaunchPoints, occluded
 from creeping.shadow.line import ShadowLine, shares_of
 from creeping.shadow.meshes import prepared
-from creeping.shadow.status import ATTACHED, NO_RAY
+from creeping.shadow.status import NO_RAY, PointState
 from creeping.storage.memory import within_budget
 
 EARLY = 0.28
@@ -106,7 +106,7 @@ def launched_by(fan: RayFan) -> LaunchPoints:
         arc.astype(float),
         fan.spacing[mine],
         closed,
-        np.full(len(mine), ATTACHED),
+        np.full(len(mine), PointState.ATTACHED),
     )
     return LaunchPoints(fan.line.direction[None], *(row[None] for row in rows))
 
