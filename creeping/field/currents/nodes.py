@@ -210,7 +210,12 @@ def radius_rates(
 
 def ray_nodes(fan: RayFan, wavenumber: float, boundary: Boundary) -> RayNodes:
     """Nodes along the creeping rays of a fan's incidence, as long and as dense as the wavenumber, 1/L, asks for."""
-    length = _length(fan, wavenumber, boundary)
+    typical = fan.curvature[:, 0]
+    # a boundary's own mode may be slower than the hard one's, by which rays are long by default
+    m = fock_scale(wavenumber, np.median(typical, keepdims=True) if len(typical) else np.ones(1))
+    slowest = slowest_decay(boundary, m, fan.points[:, 0]) if np.all(np.isfinite(m)) else 0.0
+    # a mode that decays less ends with the longest rays
+    length = ray_length(fan.line, wavenumber=wavenumber, decay=max(slowest, 1e-3))
     wavelength = 2 * np.pi / wavenumber
     attached = sum(curve.length for curve in fan.line.curves) * fan.line.fractions["attached"]
     # marches ask for some rays on each arc, and arcs of bodies of pieces are many and short
@@ -234,16 +239,6 @@ def ray_nodes(fan: RayFan, wavenumber: float, boundary: Boundary) -> RayNodes:
     rays, normals, weights = rays[there], normals[there], weights[there]
     twist = nodes_at(fan.body, rays.points, normals).twist(rays.directions)
     return RayNodes(dense, np.nonzero(there)[0], rays, normals, weights, twist)
-
-
-def _length(fan: RayFan, wavenumber: float, boundary: Boundary) -> float:
-    """Length, L, at which the slowest mode of the boundary has died away."""
-    typical = fan.curvature[:, 0]
-    # a boundary's own mode may be slower than the hard one's, by which rays are long by default
-    m = fock_scale(wavenumber, np.median(typical, keepdims=True) if len(typical) else np.ones(1))
-    slowest = slowest_decay(boundary, m, fan.points[:, 0]) if np.all(np.isfinite(m)) else 0.0
-    # a mode that decays less ends with the longest rays
-    return ray_length(fan.line, wavenumber=wavenumber, decay=max(slowest, 1e-3))
 
 
 def _share_of_rays(

@@ -388,18 +388,15 @@ def port_geodesics(
     """All between ports (n, 3), L, up to a length, L; from the first so many, if not from all."""
     # so far from a caustic a port is close to it
     pad = float(2 * np.cbrt(size(body) / k**2))
-    return rays_between(body, ports, _fan_length(body, k, length), pad=pad, sources=sources)
-
-
-def _fan_length(body: Surface, k: float, length: Length) -> float:
-    """Length of geodesics, L: "auto" is by the decay of the first mode at the root mean square curvature to e^-13."""
     if not (isinstance(length, str) and length == AUTO):
-        return positive_number(length, "length")
-    box = np.asarray(body.bounds, dtype=float)
-    girth = np.pi * float(np.max(box[1] - box[0]))
-    typical = float(np.median(curvature_norms(body, points_of_charts(body)))) / np.sqrt(2)
-    decay = float(hard_modes().tau[0].imag) * np.cbrt(k / 2) * np.cbrt(typical) ** 2
-    return float(np.clip(13 / decay, 0.65 * girth, 1.2 * girth))
+        long = positive_number(length, "length")
+    else:
+        # by the decay of the first mode at the root mean square curvature, to e^-13
+        girth = np.pi * float(np.max(np.ptp(np.asarray(body.bounds, dtype=float), axis=0)))
+        typical = float(np.median(curvature_norms(body, points_of_charts(body)))) / np.sqrt(2)
+        decay = float(hard_modes().tau[0].imag) * np.cbrt(k / 2) * np.cbrt(typical) ** 2
+        long = float(np.clip(13 / decay, 0.65 * girth, 1.2 * girth))
+    return rays_between(body, ports, long, pad=pad, sources=sources)
 
 
 def _coupled(

@@ -69,22 +69,17 @@ def far_geometry(fan: RayFan, observation: ArrayLike) -> "FarGeometry":
     def make() -> FarGeometry:
         tracer = RayTracer(fan.body, fan.length)
         # not the fan itself: this is kept as long as the fan lives
-        line, make = fan.line, _forward_parts(fan)
+        line, known = fan.line, ref(fan)
+
+        def forward(_: int) -> tuple[ShadowLine, tuple[Strip, ...]]:
+            found = known()
+            assert found is not None
+            return line, fan_strips(found)
+
         attached = np.array([(line.fractions if is_piecewise(line.body) else shares_of(line))["attached"]])
-        return FarGeometry(fan.flow, launched_by(fan), tracer, r[None], attached, lambda _: (line, make()))
+        return FarGeometry(fan.flow, launched_by(fan), tracer, r[None], attached, forward)
 
     return memo_of(fan, "far geometry", r.tobytes(), make, 1)
-
-
-def _forward_parts(fan: RayFan) -> "Callable[[], tuple[Strip, ...]]":
-    known = ref(fan)
-
-    def make() -> tuple[Strip, ...]:
-        found = known()
-        assert found is not None
-        return fan_strips(found)
-
-    return make
 
 
 def launched_by(fan: RayFan) -> LaunchPoints:

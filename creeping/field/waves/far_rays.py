@@ -44,7 +44,6 @@ from creeping.field.waves.reflected import (
 from creeping.field.waves.shed_wave import shed_orders, smoothstep
 from creeping.geometry.surface import size
 from creeping.rays.quantities import RayPoints
-from creeping.rays.shedding import ShedRays
 from creeping.rays.specular import SpecularPoints
 
 MATTERS = 0.05
@@ -196,7 +195,7 @@ class Parts:
         self._add_rays(number, kind, share)
         if np.any(self.in_fan > 0):
             self._add_fan(number, kind)
-        self._add_reflected(number, kind)
+        self._add_specular(number, kind, g.specular, (1 - w)[g.specular.observer])
         if np.any(w > 0):
             self._add_forward(number, kind)
 
@@ -211,14 +210,11 @@ class Parts:
         wave = second if self.order == 2 else first
         off = beyond(np.abs(second - first), wave, self.order, self.unsure)
         if self.vector:
-            self._doubt_turning(shed, wave)
+            # what may pass from creeping waves of one polarisation into the other on their way
+            passing = np.nan_to_num(turning(shed.rays, self.wavenumber) * np.abs(wave))
+            np.add.at(self.doubt, shed.observer, passing[:, None, None] ** 2)
         each, doubts = (self._each(number, shed.observer, one, *normals) for one in (wave, off))
         self._add_apart(self.creeping, shed.observer, each, doubts, merged)
-
-    def _doubt_turning(self, shed: ShedRays, wave: ComplexArray) -> None:
-        """Note what may pass from creeping waves (n,) of one polarisation into the other on their way."""
-        share = np.nan_to_num(turning(shed.rays, self.wavenumber) * np.abs(wave))
-        np.add.at(self.doubt, shed.observer, share[:, None, None] ** 2)
 
     def _add_fan(self, number: int, kind: Boundary) -> None:
         g, k = self.geometry, self.wavenumber
@@ -228,10 +224,6 @@ class Parts:
         waves = fan_half(nodes, g.directions, k, kind)
         sums = [self._summed(number, nodes.observer, _weighted(share, wave), *normals) for wave in waves]
         self._add_whole(self.creeping, *sums)
-
-    def _add_reflected(self, number: int, kind: Boundary) -> None:
-        s = self.geometry.specular
-        self._add_specular(number, kind, s, (1 - self.in_forward)[s.observer])
 
     def _add_specular(self, number: int, kind: Boundary, s: SpecularPoints, share: FloatArray) -> None:
         """Add specular points (n,), each by a share (n,)."""

@@ -37,6 +37,7 @@ from creeping.field.arguments import scales
 from creeping.field.boundary import Boundary, fock_scale, modes_of
 from creeping.field.waves.shed_wave import shed_wave
 from creeping.geodesics.attenuation import curvature_values
+from creeping.geodesics.pieces import to_tips
 from creeping.geodesics.states import M11, P, X
 from creeping.geometry.piecewise import tips_of
 from creeping.geometry.surface import Surface, size
@@ -110,7 +111,7 @@ def likely_found(
         apart = np.linalg.norm(corners_of - observers[:, None], axis=2).min(axis=1)
         wide = np.linalg.norm(corners_of[:, :, None] - corners_of[:, None], axis=3).max(axis=(1, 2))
         off = np.maximum(np.abs(u1 - 0.5), np.abs(v1 - 0.5))
-        bent = (off > 8) | (_from_tips(body, x).reshape(n, 4).min(axis=1) < 0.03 * size(body))
+        bent = (off > 8) | (to_tips(tips_of(body)[1], x).reshape(n, 4).min(axis=1) < 0.03 * size(body))
         near = (off <= 1.5) | bent | (apart <= 0.1)
         reach = np.where(bent, 0.4, np.minimum(0.6 * wide, 0.4))
         towards = _bilinear(ahead, np.clip(u1, 0, 1), np.clip(v1, 0, 1))[0] > 0.8
@@ -119,14 +120,6 @@ def likely_found(
         one = parted(body, corners[:, 0], corners[:, 1], np.max(np.abs(J), axis=1)[:, None], spacing)
         # where nothing can be told, a cell is likely
         return np.asarray(likely[((near & towards & (apart <= reach)) | ~np.isfinite(u1 + v1)) & ~np.any(one, axis=1)])
-
-
-def _from_tips(body: Any, x: FloatArray) -> FloatArray:
-    """Distances of points (n, 3) from the nearest tip, L."""
-    tips = tips_of(body)[1]
-    if not len(tips):
-        return np.full(len(x), np.inf)
-    return np.asarray(np.min(np.linalg.norm(x[:, None] - tips, axis=2), axis=1))
 
 
 def parted(body: Any, x: FloatArray, other: FloatArray, spreading: FloatArray, spacing: FloatArray) -> BoolArray:

@@ -197,7 +197,9 @@ def own_error(
         ends = zip(scales(rays, wavenumber), rays.radius_rate, rays.radius_bend, strict=True)
         small, varying = np.mean([[m**-2, (np.abs(bend) + rate**2) / m**2] for m, rate, bend in ends], axis=0)
         if height is None:
-            across = _mean_across(rays, wavenumber)
+            # rho kappa_t/m^2, mean of both ends
+            pairs = zip(transverse_ratios(rays), scales(rays, wavenumber), strict=True)
+            across = np.mean([np.abs(r) / m**2 for r, m in pairs], axis=0)
             power = small if boundary.kind == "conductor" else across
             growing = np.hypot(of.varies * varying, of.across * across * power)
             growing = growing * np.maximum(fock_parameter(rays, wavenumber), LEAST_XI)
@@ -217,12 +219,6 @@ def magnitude(values: ComplexArray, like: Any) -> FloatArray:
     """|values| of the shape of ``like``: over axes beyond it, components, the root of the sum of squares."""
     size = np.abs(values)
     return np.asarray(size if size.ndim == np.ndim(like) else np.sqrt(np.sum(size**2, axis=-1)))
-
-
-def _mean_across(rays: RayPoints, wavenumber: float) -> FloatArray:
-    """rho kappa_t/m^2, mean of both ends (...)."""
-    ends = zip(transverse_ratios(rays), scales(rays, wavenumber), strict=True)
-    return np.asarray(np.mean([np.abs(r) / m**2 for r, m in ends], axis=0))
 
 
 def fold_share(strips: tuple[Strip, ...], shed: ShedRays, wavenumber: float) -> FloatArray:
