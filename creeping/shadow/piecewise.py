@@ -34,7 +34,7 @@ from creeping.shadow.curve import ShadowCurve
 from creeping.shadow.curves import moved_onto_lines
 from creeping.shadow.panels import LENGTH_TOLERANCE, PanelCurve, fit_panels
 from creeping.shadow.piece_curves import EDGE_ON, PieceCurve, curves_on, edge_on
-from creeping.shadow.status import NO_RAY, STATUSES, PointState
+from creeping.shadow.status import STATUSES, PointState
 
 MEET = 1e-7
 """Distance of the ends of two curves, in body sizes, up to which they meet, and least length of a curve."""
@@ -205,22 +205,18 @@ def launched_from(curves: tuple[ShadowCurve, ...], arcs: list[Arc], direction: F
 
     Half a spacing from the ends of an arc, where kappa_n, the illumination or the piece ends.
     """
-    points, arclength = np.full((n_rays, 3), np.nan), np.full(n_rays, np.nan)
-    curve_index = np.full(n_rays, NO_RAY, np.int16)
-    arc_index, spacing, closed, state = (np.full(n_rays, np.nan) for _ in range(4))
+    launch, first = LaunchPoints.blank(direction[None], n_rays), 0
     long = np.array([arc.end - arc.start for arc in arcs])
-    first = 0
     for number, count in enumerate(shared_out(long, n_rays)):
-        arc, rows = arcs[number], slice(first, first + count)
+        arc, rows = arcs[number], (0, slice(first, first + count))
         curve = curves[arc.curve]
         place = arc.start + long[number] * (np.arange(count) + (0.0 if arc.closed else 0.5)) / max(count, 1)
         place = np.mod(place, curve.length)
-        points[rows], arclength[rows], curve_index[rows] = curve.at(place), place, arc.curve
-        arc_index[rows], spacing[rows], closed[rows] = number, long[number] / max(count, 1), arc.closed
-        state[rows] = curve.state_at(place)
+        launch.points[rows], launch.arclength[rows], launch.curve_index[rows] = curve.at(place), place, arc.curve
+        launch.arc_index[rows], launch.spacing[rows] = number, long[number] / max(count, 1)
+        launch.closed[rows], launch.state[rows] = arc.closed, curve.state_at(place)
         first += count
-    columns: tuple[Any, ...] = (points, arclength, curve_index, arc_index, spacing, closed, state)
-    return LaunchPoints(direction[None], *(column[None] for column in columns))
+    return launch
 
 
 class EdgePart(NamedTuple):

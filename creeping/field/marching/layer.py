@@ -51,9 +51,6 @@ from creeping.field.marching.plan import MarchPlan, MarchStatus, march_plan
 from creeping.field.marching.profile import LayerGrid, RayProfiles, layer_grid
 from creeping.kernels.threads import in_threads
 
-STEPPED = ("curvature", "across", "spreading", "torsion", "lean", "potential")
-"""What steps ask of a profile, in the kernel's order."""
-
 ORDER = 4
 """P of the rational steps."""
 PER_OCTAVE = 8
@@ -258,19 +255,21 @@ class _March:
 
         profiles, edges, driven = self.profiles, self.edges[ray], int(self.driven[ray])
         s, start = profiles.s[ray], float(edges[0])
-        of = {name: profiles.cubics_of(name, ray) for name in (*STEPPED, "bend", "phase", "climb")}
+        # what steps ask of a profile, in the kernel's order
+        names = "curvature", "across", "spreading", "torsion", "lean", "potential", "phase", "climb"
+        of = {name: profiles.cubics_of(name, ray) for name in names}
         eta = self._admittance(ray)
         lit = np.empty((driven + 1, 4))
         b, c = (part[self.which[ray]] for part in self.rational)
         self.misfit[ray] = load_steps(
-            *(self.k, self.soft, lane, s, *(of[name] for name in STEPPED), eta, of["phase"], of["climb"]),
-            *(edges, driven, b, c, data.steps, data.poles, data.weights, data.drive, data.beta, lit),
+            *(self.k, self.soft, lane, s, tuple(of.values()), eta, edges, driven, b, c),
+            *(data.steps, data.poles, data.weights, data.drive, data.beta, lit),
         )
         data.switch[lane] = driven
+        bend, heights = profiles.cubics_of("bend", ray), (grid.nodes, grid.levels, grid.fade, grid.scale)
         load_waves(
-            *(self.k, self.soft, lane, s, of["bend"], profiles.curves[ray], of["across"], of["lean"], eta),
-            *(start, self.plan.stop[ray], lit),
-            *(grid.nodes, grid.levels, grid.fade, grid.scale, data.wave, data.incident),
+            *(self.k, self.soft, lane, s, bend, profiles.curves[ray], of["across"], of["lean"], eta),
+            *(start, self.plan.stop[ray], lit, heights, data.wave, data.incident),
         )
         y = np.sqrt(lit[:, 3]) * np.exp(1j * self.k * lit[:, 1])
         # the total is the scattered wave and this, or its slope

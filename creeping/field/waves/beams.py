@@ -46,15 +46,7 @@ from scipy.integrate import cumulative_trapezoid
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
 from creeping.field.boundary import Boundary
 from creeping.field.waves.far_geometry import fan_strips
-from creeping.field.waves.ray_sums import (
-    LOST,
-    RaySum,
-    fold_share,
-    judged_sum,
-    magnitude,
-    merging_error,
-    total_of,
-)
+from creeping.field.waves.ray_sums import LOST, RaySum, fold_share, judged_sum, magnitude, merging_error, total_of
 from creeping.field.waves.shed_wave import smoothstep
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.pieces import trace_pieces
