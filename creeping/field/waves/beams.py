@@ -37,7 +37,6 @@ Sources: [P82], [CPP82]; Derivations, F22, F24 and F25. A to C were set on the t
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -182,19 +181,6 @@ Components = Callable[[int, FloatArray, FloatArray, BodyNodes, FloatArray], tupl
 """V and V' (n, c) of a vector's beams at places sigma, s (n,) of a strip, points of the body and tangents (n, 3)."""
 
 
-@dataclass(frozen=True, eq=False)
-class BeamSums:
-    """Sums of beams at points (n,), by feet within CUT widths of the line and beyond.
-
-    Attributes
-    ----------
-    early, late : (n,) complex, (n, c) of a vector
-    """
-
-    early: ComplexArray
-    late: ComplexArray
-
-
 def width(fan: RayFan, wavenumber: float) -> float:
     """Width w of beams at the shadow line, L."""
     return float(np.sqrt(beam_length(fan.body) / (WIDTH * wavenumber)))
@@ -221,8 +207,11 @@ def beam_sums(
     points: FloatArray,
     factors: tuple[float, ...],
     components: Components | None,
-) -> list[BeamSums]:
-    """Beams of each eps = factor WIDTH/a at points of the body (n, 3), L; those of a vector have ``components``."""
+) -> list[ComplexArray]:
+    """Beams of each eps = factor WIDTH/a at points of the body (n, 3), L; those of a vector have ``components``.
+
+    Sums (2, n) or (2, n, c) by feet within CUT widths of the line and beyond.
+    """
     sums: list[list[ComplexArray]] = [[] for _ in factors]
     for number, strip in enumerate(waves.strips):
         (low, high), (count, steps) = strip.span, _counts(strip, fan.length, waves.wavenumber)
@@ -236,7 +225,7 @@ def beam_sums(
             for mine, factor in zip(sums, factors, strict=True):
                 mine.append(beams.sums(points, WIDTH / beams.a * factor, cut))
     both = [np.sum(mine, axis=0) if mine else np.zeros((2, len(points), 1), dtype=complex) for mine in sums]
-    return [BeamSums(*(one[..., 0] if components is None else one)) for one in both]
+    return [one[..., 0] if components is None else one for one in both]
 
 
 def _beams_of(
@@ -304,8 +293,8 @@ def beams_beside_rays(
     alone = total_of(np.where(wide(near, own), own, 0.0), shed.observer, len(points))
     clear, share = wide(clear, alone), wide(share, alone)
 
-    def together(sums: BeamSums) -> ComplexArray:
-        early, late = sums.early.reshape(alone.shape), sums.late.reshape(alone.shape)
+    def together(sums: ComplexArray) -> ComplexArray:
+        early, late = (one.reshape(alone.shape) for one in sums)
         return np.asarray(clear * (share * early + late) + (1 - clear) * (alone + late))
 
     by_beams, others = (together(sums) for sums in beam_sums(fan, waves, points, FACTORS, components))
