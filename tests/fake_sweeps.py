@@ -10,7 +10,7 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.geometry.directions import fibonacci_directions
-from creeping.shadow.status import OK
+from creeping.shadow.status import LineStatus
 from creeping.sweeping.plan import SweepPlan
 from creeping.sweeping.request import sweep_request
 
@@ -45,7 +45,7 @@ class FakeSweeper:
         if any(np.any(np.abs(z - float(v)) < 1e-9) for v in os.environ.get("FAKE_RAISES", "").split()):
             raise ArithmeticError("a poisonous incidence")
         out = self.request.empty(len(incidences))
-        out["incidence_status"][:] = OK
+        out["incidence_status"][:] = LineStatus.OK
         out["line_length"][:] = 2 * np.pi + z
         k = np.array(self.request.wavenumbers)
         out["total"][:] = out["creeping"][:] = np.exp(1j * k * z[:, None, None])

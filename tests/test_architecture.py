@@ -50,7 +50,6 @@ AT_ROOT = (*FOLDERS, "pyproject.toml", "README.md", "LICENSE", "CHANGELOG.md", "
 SHARED_CONSTANTS = (
     "creeping.geodesics.tableaus",
     "creeping.rays.quantities",
-    "creeping.shadow.status",
 )
 NOT_COMPILED = ("creeping._typing", "creeping.errors", "platformdirs")
 

@@ -29,7 +29,7 @@ from creeping.geometry.checks import WRONG_SIGNS, wrong_signs
 from creeping.geometry.directions import directions_from_azimuth_elevation
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface
-from creeping.shadow.status import FAILED, SINGULAR
+from creeping.shadow.status import LineStatus
 from creeping.sweeping.blocks import Rows
 from creeping.sweeping.echoes import backscatter, bistatic, echo_of, monostatic_method
 from creeping.sweeping.over_wavenumbers import averages_of, t_matrices
@@ -228,7 +228,9 @@ def summary_of(body: str, request: EchoRequest, echo: Echo, dataset: Any) -> dic
             "least_k_rho": float(least.min()) if least.size else None,
             "largest_transverse": float(largest.max()) if largest.size else None,
         },
-        "failed_incidences": int(np.sum(none & np.isin(dataset["incidence_status"].values, (SINGULAR, FAILED)))),
+        "failed_incidences": int(
+            np.sum(none & np.isin(dataset["incidence_status"].values, (LineStatus.SINGULAR, LineStatus.FAILED)))
+        ),
         "errors": dataset.attrs.get("errors"),
         "digest": dataset.attrs.get("sweep_digest"),
     }

@@ -76,7 +76,7 @@ def write_planes(
         if plane.axes is not None:
             asked |= {"across": plane.axes[0], "up": plane.axes[1]}
         grid = cut_grid(source, **asked)
-        progress(f"field on the plane {plane.text}: {len(grid.points)} points")
+        progress(f"field on the plane {plane.text}: {grid.outside.sum()} points")
         started = time.perf_counter()
         if job.boundary == "pec":
             # the transmitted one of the first component that pictures show

@@ -43,8 +43,8 @@ W1 = 2 * np.sqrt(np.pi) * np.exp(1j * np.pi / 6)
 
 SERIES = 1.5
 """ξ up to which the series in powers of ξ^(3/2) serves, forty terms of it: good to 1e-13 there."""
-DEEP, FEW = 4.0, 5
-"""ξ from which on so few modes are summed, before it sixteen: to 1e-10."""
+DEEP = 4.0
+"""ξ from which on five modes are summed, before it sixteen: to 1e-10."""
 _BRANCHES: dict[tuple[complex, int], tuple[list[complex], list[ComplexArray]]] = {}
 
 
@@ -331,7 +331,7 @@ def _by_series_and_modes(
     near = xi[small]
     shift = np.sqrt(near) if kind == "R²" else near ** (-float(power))
     out[small] = shift * np.polynomial.polynomial.polyval(near**1.5, _terms(power, kind))
-    for some, count in ((~small & ~deep, 16), (deep, FEW)):
+    for some, count in ((~small & ~deep, 16), (deep, 5)):
         out[some] = far(xi[some, None], count)
     return out
 

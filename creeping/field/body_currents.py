@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from creeping._typing import FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import checked, checked_plain
 from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, scalar_boundaries
@@ -24,7 +23,6 @@ from creeping.geometry.arguments import one_of
 from creeping.geometry.piecewise import has_edges, is_piecewise
 from creeping.geometry.surface import Surface, memo_of, size
 from creeping.rays.fan import RayFan
-from creeping.shadow.line import ShadowLine
 
 CUT = 1e-3
 """Share of the shadow line without rays from which the lit side is not that of a convex body."""
@@ -138,6 +136,10 @@ def _expanded(fan: RayFan, lit: LitNodes, k: float, kinds: tuple[Boundary, ...])
         bright, first = lit_waves(lit, fan.line.direction, size(fan.body), k, kind)
         dark, second = ray_waves(shadow, k, kind)
         values, change = np.concatenate([bright, dark]), np.concatenate([bright - first, second])
+    # an eighth of a wavelength apart on all curves of the line
+    counts = [max(64, int(np.ceil(4 * curve.length * k / np.pi))) for curve in fan.line.curves]
+    pairs = zip(fan.line.curves, counts, strict=True)
+    rim = [curve.at(curve.length * (np.arange(count) + 0.5) / count) for curve, count in pairs]
     make = ConductorCurrents if kind.kind == "conductor" else SurfaceCurrents
     return make(
         body=fan.body,
@@ -149,22 +151,12 @@ def _expanded(fan: RayFan, lit: LitNodes, k: float, kinds: tuple[Boundary, ...])
         values=values,
         change=change,
         lit=np.arange(len(values)) < len(lit.points),
-        rim=_rim(fan.line, k),
+        rim=np.concatenate(rim),
         rim_length=fan.line.length,
         unserved=_unserved(fan),
         wavenumber=k,
         boundary=kind,
     )
-
-
-def _rim(line: ShadowLine, wavenumber: float) -> FloatArray:
-    """Points of a shadow line (l, 3), an eighth of a wavelength apart on all its curves."""
-    apart = np.pi / (4 * wavenumber)
-    parts = []
-    for curve in line.curves:
-        count = max(64, int(np.ceil(curve.length / apart)))
-        parts.append(curve.at(curve.length * (np.arange(count) + 0.5) / count))
-    return np.concatenate(parts)
 
 
 def cached_currents(

@@ -9,7 +9,7 @@ Sources: Derivations, F17 and F26.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -40,8 +40,31 @@ ENOUGH, MOST = 60_000, 400_000
 """Points of a cut that is given no step, and of any."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class FieldCut(Drawn):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class CutGrid:
+    """Points of a cut before their field is known; attributes as of `FieldCut`."""
+
+    direction: FloatArray
+    point: FloatArray
+    axes: FloatArray
+    across: FloatArray
+    up: FloatArray
+    outside: BoolArray
+    wavenumber: float
+
+    @property
+    def points(self) -> FloatArray:
+        """Grid points (ny, nx, 3), L."""
+        return grid_points(self.point, self.axes, self.across, self.up)
+
+    @property
+    def step(self) -> float:
+        """Larger of the two grid spacings, L."""
+        return float(max(self.across[1] - self.across[0], self.up[1] - self.up[0]))
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class FieldCut(CutGrid, Drawn):
     """Field on a rectangular grid (ny, nx) in a plane.
 
     Attributes
@@ -59,6 +82,7 @@ class FieldCut(Drawn):
         Coordinates of the grid points.
     outside : (ny, nx) bool
         Whether each grid point is outside the body.
+    wavenumber : float, 1/L
     field : NearField or ConductorField
         Field at the m points outside the body, row by row.
 
@@ -77,24 +101,8 @@ class FieldCut(Drawn):
     """
 
     body: Surface
-    direction: FloatArray
     line: ShadowLine | None
-    point: FloatArray
-    axes: FloatArray
-    across: FloatArray
-    up: FloatArray
-    outside: BoolArray
     field: NearField | ConductorField
-
-    @property
-    def points(self) -> FloatArray:
-        """Grid points (ny, nx, 3), L."""
-        return grid_points(self.point, self.axes, self.across, self.up)
-
-    @property
-    def step(self) -> float:
-        """Larger of the two grid spacings, L."""
-        return float(max(self.across[1] - self.across[0], self.up[1] - self.up[0]))
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -282,47 +290,18 @@ def field_cut(
     if not conductor and polarisation is not None:
         raise InvalidInputError("polarisation is of a conductor's field; give it with boundary='pec'")
     wave = "theta" if polarisation is None else polarisation
+    x, k, line = grid.points[grid.outside], grid.wavenumber, None
     field: NearField | ConductorField
     if isinstance(source, Solution):
-        field = (
-            source.conductor_field(grid.points, incidence, wave)
-            if conductor
-            else source.near_field(grid.points, incidence)
-        )
-    elif conductor:
-        field = conductor_field(source, grid.points, wavenumber=grid.wavenumber, polarisation=wave, method=method)
+        field = source.conductor_field(x, incidence, wave) if conductor else source.near_field(x, incidence)
     else:
-        field = near_field(
-            source, grid.points, wavenumber=grid.wavenumber, boundary=boundary, order=order, method=method
+        line = source.line
+        field = (
+            conductor_field(source, x, wavenumber=k, polarisation=wave, method=method)
+            if conductor
+            else near_field(source, x, wavenumber=k, boundary=boundary, order=order, method=method)
         )
-    line = source.line if isinstance(source, RayFan) else None
-    parts = {name: getattr(grid, name) for name in ("point", "axes", "across", "up", "outside")}
-    return FieldCut(body=source.body, direction=grid.direction, line=line, field=field, **parts)
-
-
-@dataclass(frozen=True, eq=False)
-class CutGrid:
-    """Points of a cut before their field is known.
-
-    Attributes
-    ----------
-    point, axes, across, up, outside
-        As of `FieldCut`.
-    points : (m, 3), L
-        Those outside the body, in the order of the grid's rows.
-    direction : (3,)
-        Of the wave.
-    wavenumber : float, 1/L
-    """
-
-    point: FloatArray
-    axes: FloatArray
-    across: FloatArray
-    up: FloatArray
-    outside: BoolArray
-    points: FloatArray
-    direction: FloatArray
-    wavenumber: float
+    return FieldCut(body=source.body, line=line, field=field, **vars(grid))
 
 
 def cut_grid(
@@ -373,11 +352,14 @@ def cut_grid(
         return fan is None or affordable(fan, int(weight * _count(sides, spacing)), k)
 
     a, b = (_steps(side, _spacing(sides, step, k, enough)) for side in sides)
-    points = grid_points(middle, axes, a, b)
-    outside = _outside(body, points.reshape(-1, 3)).reshape(points.shape[:2])
+    shape = len(b), len(a)
+    whole = CutGrid(
+        direction=direction, point=middle.copy(), axes=axes, across=a, up=b, outside=np.ones(shape, bool), wavenumber=k
+    )
+    outside = _outside(body, whole.points.reshape(-1, 3)).reshape(shape)
     if not np.any(outside):
         raise InvalidInputError(f"all {outside.size} points are inside the body; give a larger extent")
-    return CutGrid(middle.copy(), axes, a, b, outside, points[outside], direction, k)
+    return replace(whole, outside=outside)
 
 
 def _outside(body: Surface, points: FloatArray) -> BoolArray:

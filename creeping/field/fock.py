@@ -21,7 +21,6 @@ Sources: [F65], [P79], [PBM80], [KP74] for F_t; [F65], [AS64, sec. 10.4]; Deriva
 
 from functools import cache
 from math import factorial
-from typing import NamedTuple
 
 import numpy as np
 from scipy.special import airy, wofz
@@ -54,22 +53,12 @@ HIGH = 400.0
 """Y from which height gains are expanded."""
 
 
-class _Path(NamedTuple):
-    """Quadrature nodes on both legs of the path, the functions below and above the line, scaled, and their ζ."""
-
-    t: ComplexArray
-    weight: ComplexArray
-    lower: ComplexArray
-    lower_slope: ComplexArray
-    upper: ComplexArray
-    upper_slope: ComplexArray
-    fall: ComplexArray
-    rise: ComplexArray
-
-
 @cache
-def _path() -> _Path:
-    """Gauss panels on both legs."""
+def _path() -> tuple[ComplexArray, ...]:
+    """Gauss nodes t on both legs of the path and their weights, w1 and w1' there, what stands above, and both ζ.
+
+    All but t and the weights are scaled.
+    """
     legs = []
     # reaches: the integrands fall below 1e-12 of their maximum for LIT <= ξ <= SERIES
     r, w = (24.0 * part for part in _panels(14))
@@ -79,29 +68,27 @@ def _path() -> _Path:
         upper, upper_slope, rise = scaled_v(t) if turn.imag < 0 else scaled_w2(t)
         lower, lower_slope, fall = scaled_w1(t)
         legs.append((t, w * turn, lower, lower_slope, upper, upper_slope, fall, rise))
-    return _Path(*(np.concatenate(parts) for parts in zip(*legs, strict=True)))
+    return tuple(np.concatenate(parts) for parts in zip(*legs, strict=True))
 
 
 def _by_path(which: str, xi: FloatArray, q: ComplexArray | None, power: int) -> ComplexArray:
     """p*, its derivative in q, or the surface function by both legs: xi (n,), q (n,) or None for soft."""
-    path = _path()
+    t, weight, lower, lower_slope, upper, upper_slope, fall, rise = _path()
     out = np.empty(len(xi), dtype=complex)
     # on the upper leg the path runs towards 0 in g and F; d/dq of V is -1/(..)², of W/2i it is 1/(..)² (Wronskians)
-    turned = np.where(path.t.imag > 0, 1.0, -1.0)
+    turned = np.where(t.imag > 0, 1.0, -1.0)
     # blocks bound the memory of points x nodes
     for first in range(0, len(xi), 4096):
         part = slice(first, first + 4096)
         below, above = (
-            (path.lower, path.upper)
-            if q is None
-            else (path.lower_slope - q[part, None] * path.lower, path.upper_slope - q[part, None] * path.upper)
+            (lower, upper) if q is None else (lower_slope - q[part, None] * lower, upper_slope - q[part, None] * upper)
         )
-        phase = 1j * xi[part, None] * path.t
+        phase = 1j * xi[part, None] * t
         if which == "pekeris":
-            terms = above / below * np.exp(phase + path.fall - path.rise)
+            terms = above / below * np.exp(phase + fall - rise)
         else:
-            terms = turned * _others(which, phase, path.lower, below, path.fall)
-        out[part] = terms @ (path.weight * path.t**power) / np.sqrt(np.pi)
+            terms = turned * _others(which, phase, lower, below, fall)
+        out[part] = terms @ (weight * t**power) / np.sqrt(np.pi)
     return out
 
 

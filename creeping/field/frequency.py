@@ -29,8 +29,6 @@ HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "ghz": 1e9, "thz": 1e12}
 METRES = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9}
 """Units of wavelength, m."""
 
-UNITS = ((1e9, "GHz"), (1e6, "MHz"), (1e3, "kHz"), (1.0, "Hz"))
-"""Units in which frequencies are shown, the largest first."""
 WINDOWS = ("hann", "none", "taylor")
 PADDING = 8
 """Samples for each one that the band resolves."""
@@ -104,7 +102,9 @@ def frequency(wavenumber: ArrayLike, *, sound_speed: float | None = None) -> flo
     return float(found) if found.ndim == 0 else np.asarray(found)
 
 
-def suited(value: float, units: tuple[tuple[float, str], ...] = UNITS) -> tuple[float, str]:
+def suited(
+    value: float, units: tuple[tuple[float, str], ...] = ((1e9, "GHz"), (1e6, "MHz"), (1e3, "kHz"), (1.0, "Hz"))
+) -> tuple[float, str]:
     """Size and name of the largest unit that a value reaches; of the smallest if it reaches none.
 
     Examples
@@ -231,7 +231,12 @@ def band_sum(
     # e^{-ik_n t} = e^{-i n dk first} e^{-2 pi i n j/count} e^{-ik_1 t} at the delay of number j
     turned = values * column(weights * np.exp(-1j * step * first * np.arange(len(k))))
     sums = np.fft.fft(turned, count, axis=0) * column(np.exp(-1j * k[0] * delay))
-    return BandSum(delay, np.asarray(sums), weights, _resolution(weights, step))
+    # full width at half power of the window's transform, between its bins
+    bins = 64 * len(weights)
+    shape, half = np.abs(np.fft.rfft(weights, bins)), np.sqrt(0.5)
+    below = int(np.argmax(shape < half))
+    part = (shape[below - 1] - half) / (shape[below - 1] - shape[below])
+    return BandSum(delay, np.asarray(sums), weights, float(2 * (below - 1 + part) / bins * 2 * np.pi / step))
 
 
 def _window(name: str, count: int) -> FloatArray:
@@ -243,13 +248,3 @@ def _window(name: str, count: int) -> FloatArray:
         return np.ones(count)
     found = windows.hann(count + 2)[1:-1] if name == "hann" else windows.taylor(count, nbar=4, sll=35)
     return np.asarray(found, dtype=float)
-
-
-def _resolution(weights: FloatArray, step: float) -> float:
-    """Full width at half power of the window's transform, L."""
-    count = 64 * len(weights)
-    shape = np.abs(np.fft.rfft(weights, count))
-    below = int(np.argmax(shape < np.sqrt(0.5)))
-    # between the bins
-    part = (shape[below - 1] - np.sqrt(0.5)) / (shape[below - 1] - shape[below])
-    return float(2 * (below - 1 + part) / count * 2 * np.pi / step)

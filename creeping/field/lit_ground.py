@@ -150,20 +150,15 @@ def lit_error(
     # grazing a flat or concave place m is infinite, and optics alone stands there
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         across = np.nan_to_num(np.abs(part.across / part.along) / m**2, posinf=0.0)
+        flatness = np.maximum(0.0, 1 - 2 * np.maximum(part.along, 0.0) * extent)
         terms = (
             of.squared * (change / np.maximum(size, 1e-300)) ** 2,
             of.least / m**4 / (1 + of.fades * (np.minimum(m, 1e9) * part.cosine) ** 2),
             of.varies * (np.abs(part.bend) + part.rate**2) / m**2,
             of.across * across * (m**-2 if kind.kind == "conductor" else across),
-            _flat_error(part, k, extent),
+            # what the curvature at the end of a flat surface is worth on it
+            0.7 * flatness / (k * extent * np.maximum(part.cosine, np.cbrt(2 / (k * extent))) ** 3),
         )
     # an admittance that varies is off by more
     share = np.linalg.norm(terms, axis=0) * (1.5 if kind.varies else 1.0)
     return np.asarray(size * np.minimum(share, 1.0) + (change if order == 1 else 0.0))
-
-
-def _flat_error(part: LitNodes, k: float, extent: float) -> FloatArray:
-    """E (n,): what the curvature at the end of a flat surface is worth on it."""
-    flatness = np.maximum(0.0, 1 - 2 * np.maximum(part.along, 0.0) * extent)
-    least = np.cbrt(2 / (k * extent))
-    return np.asarray(0.7 * flatness / (k * extent * np.maximum(part.cosine, least) ** 3))

@@ -66,7 +66,10 @@ def own_waves(problem: Problem) -> SurfaceField:
         marched, off = _by_marching(fan, rays, k, kind)
         known = beyond & np.isfinite(off) & (off < np.abs(marched))
         values[known], error[known], method[known] = marched[known], off[known], "march"
-        wide[known] = _wide(fan, rays, k)[known]
+        # where the ground need not be convex the same measure goes by the body's size
+        a = beam_length(fan.body)
+        share = np.abs(rays.spreading) / (np.abs(rays.spreading) + a * np.abs(rays.spreading_rate))
+        wide[known] = (share * np.cbrt(0.5 * k * a))[known]
         beyond &= ~known
     status = np.select(
         [np.broadcast_to(~launched, shape), beyond, wide < 1],
@@ -105,13 +108,6 @@ def _by_marching(fan: RayFan, rays: RayPoints, k: float, kind: Boundary) -> tupl
     with np.errstate(divide="ignore", invalid="ignore"):
         error = off.reshape(shape) / np.sqrt(np.abs(rays.spreading))
     return spread_out(y.reshape(shape), rays, k), error
-
-
-def _wide(fan: RayFan, rays: RayPoints, k: float) -> FloatArray:
-    """The same measure (rays, steps) where the ground need not be convex, in terms of the body's size."""
-    a = beam_length(fan.body)
-    share = np.abs(rays.spreading) / (np.abs(rays.spreading) + a * np.abs(rays.spreading_rate))
-    return np.asarray(share * np.cbrt(0.5 * k * a))
 
 
 def ray_envelope(fan: RayFan, *, wavenumber: float, boundary: BoundaryLike) -> ComplexArray:

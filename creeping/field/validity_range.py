@@ -23,10 +23,7 @@ from creeping.geodesics.states import ATTENUATION, P, X, pack
 from creeping.geodesics.tableaus import RUNGE_KUTTA_4
 from creeping.geometry.arguments import one_of
 from creeping.geometry.curvature import normal_curvature
-from creeping.geometry.evaluators import evaluators
-from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface, normal
-from creeping.kernels.threads import in_threads
 from creeping.rays.fan import RayFan
 from creeping.rays.reach import early_length, trial_points
 from creeping.shadow.attachment import LaunchPoints, evenly_chosen
@@ -148,7 +145,7 @@ def launch_validity(body: Surface, launch: LaunchPoints) -> tuple[FloatArray, Fl
     incidence, ray = np.nonzero(launch.there)
     least, largest = np.full(len(launch.directions), np.nan), np.full(len(launch.directions), np.nan)
     points, directions = launch.points[incidence, ray], launch.directions[incidence]
-    along, across = _along_and_across(body, points, directions)
+    along, across = curvature_values(body, pack(points, directions)), _across(body, points, directions)
     kept = along > 0
     incidence, along, across = incidence[kept], along[kept], across[kept]
     first = np.flatnonzero(np.diff(incidence, prepend=-1))
@@ -206,19 +203,6 @@ def validity_words(found: Validity, *, measured: bool = False) -> str:
 def validity_numbers(found: Validity) -> str:
     """Both numbers as a reader sees them."""
     return f"k rho >= {found.least_k_rho:.3g}, kappa_t rho/m^2 <= {found.largest_transverse:.2g}"
-
-
-def _along_and_across(body: Surface, points: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """kappa_n and |kappa_t| (n,), 1/L, at points (n, 3) of rays in the directions (n, 3)."""
-    if is_piecewise(body):
-        return normal_curvature(body, points, directions), _across(body, points, directions)
-    from creeping.kernels.nearest import normal_sections
-
-    x, p = np.ascontiguousarray(points), np.ascontiguousarray(directions)
-    along, across = np.empty(len(x)), np.empty(len(x))
-    with evaluators(body) as parts:
-        in_threads(lambda some: normal_sections(*parts[:2], x[some], p[some], along[some], across[some]), len(x))
-    return along, np.abs(across)
 
 
 def _across(body: Surface, points: FloatArray, directions: FloatArray) -> FloatArray:

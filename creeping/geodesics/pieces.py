@@ -202,7 +202,7 @@ class Walk:
         # between stops as far apart as all others, rays that are at different ones go together
         gaps = np.diff(stops)
         even = np.ptp(gaps) <= 1e-12 * self.size
-        free = (self._to_tips(rows) - short) / gaps[0]
+        free = (to_tips(self.tips, self.states[rows, X]) - short) / gaps[0]
         # rays on their way to a tip go as many stops as they are from it, to a power of two so that groups are few
         before = 2 ** np.floor(np.log2(np.clip(free, 1.0, len(stops)))) * (free >= 1) * even
         many = np.where(alone, 0, np.where(near, before, len(stops)))
@@ -245,7 +245,7 @@ class Walk:
 
         There, and far beyond an edge, a piece need not have any geodesics.
         """
-        following, tip = stops[self.place[mine] + 1], self._to_tips(mine)
+        following, tip = stops[self.place[mine] + 1], to_tips(self.tips, self.states[mine, X])
         short = np.minimum(np.maximum(0.5 * tip, 0.5 * REACH * self.size), self.longest[mine])
         step = np.minimum(short, following - self.now[mine])
         found = self._later(self._own(number, self.states[mine], step), mine, self.now[mine])
@@ -312,11 +312,6 @@ class Walk:
             near = np.linalg.norm(points - self.tips[place], axis=-1) <= REACH * self.size
             out = np.where(tip == one, near, out)
         return np.asarray(out)
-
-    def _to_tips(self, rows: IntArray) -> FloatArray:
-        """Distance of rays from the nearest tip (n,), L."""
-        away = self.tips - self.states[rows, None, X]
-        return np.asarray(np.min(np.linalg.norm(away, axis=2), axis=1, initial=np.inf))
 
     def _cross(
         self,
@@ -476,6 +471,11 @@ def windows(times: FloatArray, scale: float) -> list[tuple[FloatArray, list[tupl
         if end == len(every) - 1:
             return runs
         begin = end
+
+
+def to_tips(tips: FloatArray, x: FloatArray) -> FloatArray:
+    """Distance of points (n, 3) from the nearest of the tips (t, 3), inf if there are none: (n,)."""
+    return np.asarray(np.min(np.linalg.norm(x[:, None] - tips, axis=2), axis=1, initial=np.inf))
 
 
 def cubic_at(a: FloatArray, b: FloatArray, long: FloatArray, share: FloatArray) -> FloatArray:

@@ -23,6 +23,7 @@ from dataclasses import replace
 from functools import cache, cached_property
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from creeping._typing import Any, FloatArray, IntArray
 from creeping.errors import ToleranceError
@@ -320,20 +321,8 @@ def exit_table(body: Surface) -> FloatArray:
 
 def quaternions(s: FloatArray, q: FloatArray) -> FloatArray:
     """Unit quaternions (n, 4) of the rotations with columns s, q, s x q, from the largest of their components."""
-    b = np.cross(s, q)
-    (sx, sy, sz), (qx, qy, qz), (bx, by, bz) = s.T, q.T, b.T
-    w, x, y, z = 1 + sx + qy + bz, 1 + sx - qy - bz, 1 - sx + qy - bz, 1 - sx - qy + bz
-    rows = np.array(
-        [
-            [w, qz - by, bx - sz, sy - qx],
-            [qz - by, x, qx + sy, bx + sz],
-            [bx - sz, qx + sy, y, by + qz],
-            [sy - qx, bx + sz, by + qz, z],
-        ]
-    )
-    best = np.argmax([w, x, y, z], axis=0)
-    found = rows[best, :, np.arange(len(s))]
-    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
+    matrices = np.stack([s, q, np.cross(s, q)], axis=2)
+    return np.asarray(Rotation.from_matrix(matrices).as_quat(scalar_first=True))
 
 
 def quaternion_product(a: FloatArray, b: FloatArray) -> FloatArray:

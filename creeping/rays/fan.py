@@ -37,7 +37,7 @@ from creeping.rays.reach import AUTO, HARD_DECAY, IN_RANGE, ray_length
 from creeping.rays.transport import Flow, carried, checked_flow, spread, zeros_passed
 from creeping.shadow.attachment import LaunchPoints, line_tangents
 from creeping.shadow.line import ShadowLine, checked_launch_from
-from creeping.shadow.status import ATTACHED, CONCAVE, NO_RAY, OCCLUDED
+from creeping.shadow.status import NO_RAY
 from creeping.storage.memory import within_budget
 
 
@@ -111,11 +111,6 @@ class RayFan(DrawnOnBody):
     closed_arcs: tuple[bool, ...]
     error: ErrorEstimate
     flow: Flow
-
-    @property
-    def flow_error(self) -> ErrorEstimate | None:
-        """Error stated by the flow: of one step of a phase map; for direct integration None unless measured."""
-        return self.flow.error
 
     @property
     def length(self) -> float:
@@ -333,9 +328,8 @@ def ray_arrays(body: Surface, launch: LaunchPoints, states: FloatArray, times: F
     directions = launch.headings[there]
     tangents = None if speed_of(body) is None else line_tangents(body, points, directions)
     J, rate, stalled = spread(body, points, tangents, directions, launch.openings[there], path)
-    begun = np.zeros(3, dtype=np.int64)
-    begun[[ATTACHED, OCCLUDED, CONCAVE]] = RayStatus.OK, RayStatus.OCCLUDED, RayStatus.CONCAVE
-    begun = begun[launch.state[there].astype(int)]
+    # by the codes of `PointState`
+    begun = np.array([RayStatus.OK, RayStatus.OCCLUDED, RayStatus.CONCAVE])[launch.state[there].astype(int)]
     status, first = ends_of(body, points, path, times, begun)
     status[stalled] = RayStatus.STALLED
 

@@ -163,14 +163,15 @@ def iso_phase_curves(
 
 def _whole_steps(fan: RayFan) -> FloatArray:
     """Travel time up to which the steps of each ray are whole (rays,): one that has come to an edge stays there."""
-    moving = np.any(np.diff(fan.points, axis=1) != 0, axis=2) if is_piecewise(fan.body) else np.ones((0, 0), dtype=bool)
     out = np.full(len(fan.points), fan.length)
-    for ray in np.flatnonzero(~moving[:, -1]) if moving.size else ():
-        out[ray] = fan.travel_time[max(int(np.sum(moving[ray])) - 1, 0)]
-    if moving.size:
-        # in the last step
-        late = moving[:, -1] & np.isin(fan.status, AT_CREASES) & (fan.detachment < fan.length)
-        out[late] = fan.travel_time[-2]
+    if not is_piecewise(fan.body):
+        return out
+    moving = np.any(np.diff(fan.points, axis=1) != 0, axis=2)
+    stopped = ~moving[:, -1]
+    out[stopped] = fan.travel_time[np.maximum(np.sum(moving[stopped], axis=1) - 1, 0)]
+    # in the last step
+    late = moving[:, -1] & np.isin(fan.status, AT_CREASES) & (fan.detachment < fan.length)
+    out[late] = fan.travel_time[-2]
     return out
 
 

@@ -53,31 +53,6 @@ class MidHorizon(Rows):
     across: FloatArray
 
 
-def _polished(
-    strips: tuple[Strip, ...],
-    body: Surface,
-    observer: IntArray,
-    strip: IntArray,
-    sigma: FloatArray,
-    s: FloatArray,
-    weight: FloatArray,
-    directions: FloatArray,
-) -> HorizonRays:
-    """Nodes at σ, next to s, with weights dσ (n,), by Newton's method along each ray on n.r."""
-    limit = 0.5 * max((one.cell[1] for one in strips), default=0.0)
-    r = directions[observer]
-    for _ in range(3):
-        rays = gather(strips, strip, sigma, s)
-        n, hessian = bending(body, rays.points)
-        turned = np.einsum("nij,nj->ni", hessian, rays.directions)
-        rate = np.sum((turned - np.sum(turned * n, axis=1, keepdims=True) * n) * r, axis=1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            move = np.nan_to_num(-np.sum(n * r, axis=1) / rate)
-        s = np.maximum(s + np.clip(move, -limit, limit), 0.0)
-    rays = gather(strips, strip, sigma, s)
-    return HorizonRays(observer, rays, weight * rays.width)
-
-
 def line_crossings(strip: Strip, r: FloatArray) -> list[tuple[float, float, bool]]:
     """Intervals (σ start, σ end, shadow) of a strip with n0.r of one sign, negative on the shadow half."""
     low, high = strip.span
@@ -135,11 +110,19 @@ def forward_nodes(
                 if not np.all(found):
                     missing.append(row)
     observer, which, places, times, widths = (np.concatenate(column) for column in zip(*dark, strict=True))
-    return (
-        _polished(strips, line.body, observer, which, places, times, widths, directions),
-        MidHorizon.joined(lit),
-        np.unique(np.array(missing, dtype=np.int64)),
-    )
+    # by Newton's method along each ray on n.r
+    limit, towards = 0.5 * max((strip.cell[1] for strip in strips), default=0.0), directions[observer]
+    for _ in range(3):
+        rays = gather(strips, which, places, times)
+        n, hessian = bending(line.body, rays.points)
+        turned = np.einsum("nij,nj->ni", hessian, rays.directions)
+        rate = np.sum((turned - np.sum(turned * n, axis=1, keepdims=True) * n) * towards, axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            move = np.nan_to_num(-np.sum(n * towards, axis=1) / rate)
+        times = np.maximum(times + np.clip(move, -limit, limit), 0.0)
+    rays = gather(strips, which, places, times)
+    shadow_half = HorizonRays(observer, rays, widths * rays.width)
+    return shadow_half, MidHorizon.joined(lit), np.unique(np.array(missing, dtype=np.int64))
 
 
 def _first_crossing(strip: Strip, body: Surface, sigma: FloatArray, r: FloatArray) -> tuple[FloatArray, BoolArray]:

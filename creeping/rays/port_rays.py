@@ -147,7 +147,7 @@ def rays_between(
     senders = len(ports) if sources is None else sources
     within_budget(24.0 * PER_PAIR * (LANES + START + 3) * len(ports) * senders, f"{len(ports)} ports", "ask for fewer")
     folds = np.full((2, senders, len(ports)), np.inf)
-    owners, rows, wide = [], [], []
+    owners, rows = [], []
     counts = _ray_counts(body, ports[:senders], normals[:senders], times)
     for rays in np.unique(counts):
         mine = np.flatnonzero(counts == rays)
@@ -158,11 +158,9 @@ def rays_between(
             states = traced_fans(body, ports[numbers], normals[numbers], int(rays), times)
             for number, fan in zip(numbers, states, strict=True):
                 owner, found = _passages(body, fan, times[1], ports, int(number), pad, folds[:, number])
-                owners.append((np.full(len(owner), number), owner))
+                owners.append(np.stack([np.full(len(owner), number), owner]))
                 rows.append(found)
-                wide.append(np.full(len(owner), rays))
-    first, second = (np.concatenate([pair[k] for pair in owners]) for k in range(2))
-    return _assembled(body, ports, normals, length, times[1], first, second, np.concatenate(rows), wide, folds)
+    return _assembled(body, ports, length, np.concatenate(owners, axis=1), np.concatenate(rows), folds)
 
 
 def _ray_counts(body: Surface, ports: FloatArray, normals: FloatArray, times: FloatArray) -> IntArray:
@@ -198,7 +196,7 @@ def _passages(
     pad: float,
     folds: FloatArray,
 ) -> tuple[IntArray, FloatArray]:
-    """Ports of higher numbers that one fan passes (m,), and what is known there; fills ``folds`` (2, n)."""
+    """Ports of higher numbers that one fan passes (m,), angle, arclength and lanes there; fills ``folds`` (2, n)."""
     from creeping.rays.kernels.port_fans import BEHIND, LANES, START, passed, port_fan
     from creeping.rays.kernels.quantities import polynomial_matrix
 
@@ -223,29 +221,21 @@ def _passages(
         return np.asarray((np.minimum(turn, rays - turn) < 1e-4) & (later < 1e-4))
 
     kept = first_of_equals(owner, alike)
-    return owner[kept], found[kept]
+    owner, found = owner[kept], found[kept]
+    found[:, :2] *= 2 * np.pi / rays, step
+    return owner, found
 
 
 def _assembled(
-    body: Surface,
-    ports: FloatArray,
-    normals: FloatArray,
-    length: float,
-    step: float,
-    first: IntArray,
-    second: IntArray,
-    rows: FloatArray,
-    wide: list[IntArray],
-    folds: FloatArray,
+    body: Surface, ports: FloatArray, length: float, ends: IntArray, rows: FloatArray, folds: FloatArray
 ) -> PortRays:
-    """Geodesics in order of pairs and length."""
+    """Geodesics between ports (2, m), in order of pairs and length."""
     from creeping.rays.kernels import port_fans as lane
 
-    arclength = rows[:, 1] * step
-    order = np.flatnonzero(arclength <= length)
-    order = order[np.lexsort((arclength[order], second[order], first[order]))]
-    first, second, rows, arclength = first[order], second[order], rows[order], arclength[order]
-    angles = 2 * np.pi * rows[:, 0] / np.concatenate(wide)[order]
+    order = np.flatnonzero(rows[:, 1] <= length)
+    order = order[np.lexsort((rows[order, 1], *ends[::-1, order]))]
+    (first, second), rows, normals = ends[:, order], rows[order], normal(body, ports)
+    angles, arclength = rows[:, 0], rows[:, 1]
     known, start = rows[:, 2 : 2 + lane.LANES], rows[:, 2 + lane.LANES :]
     one, two = tangent_frames(normals)
     leaving = one[first] * np.cos(angles)[:, None] + two[first] * np.sin(angles)[:, None]
@@ -259,7 +249,7 @@ def _assembled(
     principal = np.where(principal < 0, principal + np.pi, principal)
     caustics = np.maximum(np.rint((known[:, lane.LANE.angle] - principal) / np.pi), 0).astype(np.int64)
 
-    def ends(of: int) -> FloatArray:
+    def at_ends(of: int) -> FloatArray:
         return np.stack([start[:, of - lane.LANE.kappa], known[:, of]], axis=1)
 
     # of the Jacobi field that is 1 at the first end and 0 at the second
@@ -279,9 +269,9 @@ def _assembled(
         spreading=J2,
         rates=np.stack([known[:, lane.LANE.M11], rate], axis=1),
         caustics=caustics,
-        curvature=ends(lane.LANE.kappa),
-        torsion=ends(lane.LANE.T),
-        bend=ends(lane.LANE.B),
+        curvature=at_ends(lane.LANE.kappa),
+        torsion=at_ends(lane.LANE.T),
+        bend=at_ends(lane.LANE.B),
         integrals=known[:, lane.LANE.integrals : lane.LANE.integrals + lane.PARTS],
         turning=turning,
         error=start[:, lane.START],

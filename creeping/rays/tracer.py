@@ -266,14 +266,7 @@ def _open(states: FloatArray, openings: FloatArray) -> None:
         states[..., M21] += openings[:, None] * states[..., M22]
 
 
-def rays_towards(
-    tracer: RayTracer,
-    directions: FloatArray,
-    observers: FloatArray,
-    near: FloatArray,
-    times: FloatArray,
-    cell: FloatArray,
-) -> tuple[SingleRays, IntArray, FloatArray]:
+class RaySearch:
     """Rays with p = r next to given points and times.
 
     Parameters
@@ -284,21 +277,6 @@ def rays_towards(
     times : (n,)
     cell : (n, 2), L
         Distances of neighbouring rays and samples: a search that leaves its neighbourhood is given up.
-
-    Returns
-    -------
-    SingleRays (m,)
-        Those that were found.
-    found, moved : (m,)
-        Their rows, and how far along the line they start from where the search began, in cells.
-    """
-    search = _Search(tracer, directions, observers, near, times, cell)
-    rays, found = search.result()
-    return rays, found, search.moved[found]
-
-
-class _Search:
-    """What `rays_towards` finds.
 
     Attributes
     ----------

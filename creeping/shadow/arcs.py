@@ -21,13 +21,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize.elementwise import find_root
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.geometry.incident import headings
 from creeping.geometry.surface import Surface, size
 from creeping.shadow.attachment import SAMPLES, LaunchPoints, occluded
 from creeping.shadow.curves import NEAR, Curves, moved_onto_lines
-from creeping.shadow.status import ATTACHED, CONCAVE, OCCLUDED, STATUSES
+from creeping.shadow.status import STATUSES, PointState
 
 
 class Breaks(NamedTuple):
@@ -80,22 +81,13 @@ def _cusps(curves: Curves) -> tuple[IntArray, FloatArray, BoolArray]:
     node = np.flatnonzero(changes)
     where = curves.own[node]
     cell = node - curves.first[where]
-    # the Illinois rule: an end that is kept twice has its value halved
-    low, high, last = np.zeros(len(node)), np.ones(len(node)), np.zeros(len(node))
-    at_low, at_high, u = a[node], b[node], np.zeros(len(node))
-    u[at_high == 0] = 1.0
-    for _ in range(40 if len(node) else 0):
-        open_ = (high - low > 1e-13) & (at_low != 0) & (at_high != 0)
-        if not open_.any():
-            break
-        u = np.where(open_, (low * at_high - high * at_low) / np.where(open_, at_high - at_low, 1.0), u)
-        value = curves.values_at(a[:, None], where, cell + u)[:, 0]
-        up = (value > 0) == (at_high > 0)
-        at_low = np.where(open_ & up & (last == 1), 0.5 * at_low, np.where(open_ & ~up, value, at_low))
-        at_high = np.where(open_ & ~up & (last == -1), 0.5 * at_high, np.where(open_ & up, value, at_high))
-        low, high = np.where(open_ & ~up, u, low), np.where(open_ & up, u, high)
-        last = np.where(up, 1, -1)
-    return where, cell + u, hidden
+
+    def value(u: FloatArray, curve: IntArray, at: IntArray) -> FloatArray:
+        return curves.values_at(a[:, None], curve, at + u)[:, 0]
+
+    ends = np.zeros(len(node)), np.ones(len(node))
+    found = find_root(value, ends, args=(where, cell), tolerances={"xatol": 1e-13}).x if len(node) else ends[0]
+    return where, cell + found, hidden
 
 
 class Picture(NamedTuple):
@@ -308,7 +300,7 @@ def _states(
     away = (outermost - curves.first[curve][:, None] - ends[:, :1]) % curves.number[curve][:, None]
     inside = own & (away > 2) & (away < long[:, None] - 2)
     asked = np.flatnonzero(~concave & ~np.any(inside, axis=1))
-    state, agree = np.where(concave, CONCAVE, ATTACHED), np.ones(len(curve), dtype=bool)
+    state, agree = np.where(concave, PointState.CONCAVE, PointState.ATTACHED), np.ones(len(curve), dtype=bool)
     if len(asked):
         probes = there.points.reshape(-1, len(tried), 3)[asked]
         q = waves[asked, None, :3] + waves[asked, None, 3:] * probes
@@ -317,7 +309,7 @@ def _states(
         before = np.where(w > 0, np.linalg.norm(q, axis=-1) / np.where(w > 0, w, 1) * SAMPLES / (SAMPLES + 1), np.inf)
         toward = np.broadcast_to(headings(waves[asked, None], probes), probes.shape)
         hidden = occluded(body, probes.reshape(-1, 3), toward.reshape(-1, 3), before.ravel()).reshape(-1, len(tried))
-        state[asked] = np.where(hidden[:, 0], OCCLUDED, ATTACHED)
+        state[asked] = np.where(hidden[:, 0], PointState.OCCLUDED, PointState.ATTACHED)
         agree[asked] = np.all(hidden == hidden[:, :1], axis=1)
     return state, agree
 
@@ -348,15 +340,15 @@ def _launched(body: Surface, curves: Curves, arcs: Arcs, n_rays: int, every: boo
     """Launch points, evenly spaced on each arc that launches."""
     n, on = len(curves.waves), arcs
     if every:
-        all_ = np.arange(len(curves.number))
-        on = Arcs(all_, np.full(len(all_), ATTACHED), np.stack([0.0 * all_, curves.number.astype(float)], axis=1))
+        all_, ends = np.arange(len(curves.number)), np.outer(curves.number, (0.0, 1.0))
+        on = Arcs(all_, np.full(len(all_), PointState.ATTACHED), ends)
     launch = LaunchPoints.blank(curves.waves, n_rays)
     line, long = curves.line[on.curve], on.ends[:, 1] - on.ends[:, 0]
     counts = np.zeros(len(line), np.int64)
     for row in range(n if n_rays else 0):
         # arcs of one line stand together
         own = np.arange(*np.searchsorted(line, (row, row + 1)))
-        own = own[on.state[own] == ATTACHED]
+        own = own[on.state[own] == PointState.ATTACHED]
         counts[own] = shared_out(long[own] * curves.spacing[on.curve[own]], n_rays)
     arc = np.repeat(np.arange(len(line)), counts)
     if not len(arc):
@@ -377,7 +369,7 @@ def _launched(body: Surface, curves: Curves, arcs: Arcs, n_rays: int, every: boo
     launch.curve_index.reshape(-1)[at] = curve - np.searchsorted(curves.line, of)
     launch.arc_index.reshape(-1)[at] = arc - firsts[of]
     launch.spacing.reshape(-1)[at], launch.closed.reshape(-1)[at] = long[arc] * spacing / given, closed
-    launch.state.reshape(-1)[at] = _state_at(curves, arcs, curve, place) if every else ATTACHED
+    launch.state.reshape(-1)[at] = _state_at(curves, arcs, curve, place) if every else PointState.ATTACHED
     return launch
 
 
@@ -404,7 +396,7 @@ def shared_out(lengths: FloatArray, wanted: int) -> IntArray:
 
 def _state_at(curves: Curves, arcs: Arcs, curve: IntArray, place: FloatArray) -> Any:
     """State of places (k,) of curves; rounding may leave one between two arcs: concave, which launches nothing."""
-    state = np.full(len(place), CONCAVE)
+    state = np.full(len(place), PointState.CONCAVE)
     begin, end = (np.searchsorted(arcs.curve, curve, side) for side in ("left", "right"))
     for step in range(int(np.max(end - begin))):
         arc = np.minimum(begin + step, end - 1)

@@ -19,7 +19,7 @@ from creeping.geometry.incident import REMEDY, headings, spherical
 from creeping.geometry.surface import Surface
 from creeping.shadow.curves import LineNodes, interpolated, polished
 from creeping.shadow.panels import PanelCurve
-from creeping.shadow.status import CONCAVE, STATUSES
+from creeping.shadow.status import STATUSES, PointState
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -101,7 +101,7 @@ class ShadowCurve(DrawnOnBody):
     def state_at(self, arclength: FloatArray) -> IntArray:
         """Codes of the status at arclengths modulo the length, of an open curve no further than its ends: (m,)."""
         # rounding may leave a place between two arcs: then it is of neither side, and concave launches nothing
-        codes = np.full(len(arclength), CONCAVE)
+        codes = np.full(len(arclength), PointState.CONCAVE)
         s = arclength if self.closed else np.clip(arclength, 0.0, np.nextafter(self.length, 0.0))
         for start, end, status in self.arcs:
             codes[np.mod(s - start, self.length) < end - start] = STATUSES.index(status)

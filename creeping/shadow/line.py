@@ -37,7 +37,7 @@ from creeping.shadow.meshes import LineMeshes, clearance, critical_distances, ju
 from creeping.shadow.panels import PanelCurve
 from creeping.shadow.piecewise import EdgePart, launched_from, piecewise_curves
 from creeping.shadow.refinement import FORBIDDEN, followed
-from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, OK, SINGULAR, STATUSES
+from creeping.shadow.status import STATUSES, LineStatus
 from creeping.storage.memory import within_budget
 
 
@@ -219,9 +219,9 @@ def shadow_line(
     status, distances = _on_meshes(body, row, take)
     code, distance = int(status[0]), float(distances[0])
     panels: tuple[PanelCurve, ...] = ()
-    if code != OK:
+    if code != LineStatus.OK:
         exact, panels, distance = followed(body, d, prepared(body).coarsest)
-        if code == NEAR_SINGULAR and len(lines[-1][0].spacing) == len(panels):
+        if code == LineStatus.NEAR_SINGULAR and len(lines[-1][0].spacing) == len(panels):
             # the meshes had the right number of curves: the line is theirs, as in a sweep
             panels = ()
         else:
@@ -337,7 +337,7 @@ class ShadowLines(Rows):
     launch: LaunchPoints
 
 
-def shadow_lines(body: Surface, directions: FloatArray, n_rays: int, *, every: bool = False) -> ShadowLines:
+def shadow_lines(body: Surface, directions: FloatArray, n_rays: int) -> ShadowLines:
     """Shadow lines of unit directions.
 
     Parameters
@@ -346,8 +346,6 @@ def shadow_lines(body: Surface, directions: FloatArray, n_rays: int, *, every: b
     directions : (n, 3)
     n_rays : int
         Launch points of each, shared among the attached arcs by length and evenly spaced on each.
-    every : bool
-        Launch points on the whole line instead.
 
     Returns
     -------
@@ -359,7 +357,13 @@ def shadow_lines(body: Surface, directions: FloatArray, n_rays: int, *, every: b
         If F = 0 has no closed triangulation in its bounds.
     """
     if is_piecewise(body):
-        return _one_by_one(body, np.asarray(directions, dtype=float), n_rays, every)
+        lines: list[ShadowLine | None] = []
+        for direction in directions:
+            try:
+                lines.append(shadow_line(body, direction, n_points=16))
+            except SingularIncidenceError:
+                lines.append(None)
+        return lines_together(np.asarray(directions, dtype=float), lines, n_rays)
     directions = np.ascontiguousarray(directions, dtype=float)
     waves, numbers = rows_of(directions), np.full((len(directions), 6), np.nan)
     launch = LaunchPoints.blank(directions, n_rays)
@@ -367,20 +371,20 @@ def shadow_lines(body: Surface, directions: FloatArray, n_rays: int, *, every: b
     def take(rows: IntArray, nodes: Sequence[LineNodes]) -> BoolArray:
         """Fill in what is known of some lines; whether it is certain (rows,)."""
         curves = Curves.of(waves[rows], nodes)
-        found = finished(body, curves, n_rays, every=every)
+        found = finished(body, curves, n_rays)
         numbers[rows, 0], numbers[rows, 1], numbers[rows, 3:] = curves.counts, curves.lengths, found.shares
         numbers[rows, 2] = [one.error for one in nodes]
         launch.put(rows, found.launch)
         return found.certain
 
     status, v = _on_meshes(body, waves, take)
-    for row in np.flatnonzero(status == FOLLOWED):
+    for row in np.flatnonzero(status == LineStatus.FOLLOWED):
         numbers[row] = np.nan
         launch.put(np.array([row]), LaunchPoints.blank(directions[[row]], n_rays))
         try:
             nodes, _, v[row] = followed(body, directions[row], prepared(body).coarsest)
         except SingularIncidenceError as refused:
-            status[row], v[row] = SINGULAR, float(getattr(refused, "distance", 0.0))
+            status[row], v[row] = LineStatus.SINGULAR, float(getattr(refused, "distance", 0.0))
             continue
         take(np.array([row]), [nodes])
     curves, length, error, attached, occluded, concave = numbers.T
@@ -395,7 +399,7 @@ def _on_meshes(
     ``take`` is given the rows (m,) of lines and their nodes on each mesh, and says whether they are certain (m,).
     """
     n, meshes, v = len(waves), prepared(body), critical_distances(body, waves)
-    status, certain = np.full(n, SINGULAR, np.int8), np.zeros(n, dtype=bool)
+    status, certain = np.full(n, LineStatus.SINGULAR, np.int8), np.zeros(n, dtype=bool)
     rows = np.flatnonzero(v >= FORBIDDEN)
     for tier in range(LineMeshes.count):
         if not len(rows):
@@ -417,33 +421,20 @@ def _on_meshes(
     return status, v
 
 
-def lines_together(
-    directions: FloatArray, lines: Sequence[ShadowLine | None], n_rays: int, *, every: bool = False
-) -> ShadowLines:
+def lines_together(directions: FloatArray, lines: Sequence[ShadowLine | None], n_rays: int) -> ShadowLines:
     """Lines of unit directions (n, 3) that were found one by one, None where one crosses itself; as `shadow_lines`."""
     n = len(directions)
-    numbers, status = np.full((n, 6), np.nan), np.full(n, SINGULAR, np.int8)
+    numbers, status = np.full((n, 6), np.nan), np.full(n, LineStatus.SINGULAR, np.int8)
     near, launches = np.zeros(n), []
     for row, (direction, line) in enumerate(zip(directions, lines, strict=True)):
         if line is None:
             launches.append(launched_from((), [], direction, n_rays))
             continue
         shares = line.fractions.values()
-        numbers[row], status[row] = (len(line.curves), line.length, line.nodes.error, *shares), OK
+        numbers[row], status[row] = (len(line.curves), line.length, line.nodes.error, *shares), LineStatus.OK
         near[row] = line.singular_distance
-        launches.append(line.launch_points(n_rays, "all" if every else "attached"))
+        launches.append(line.launch_points(n_rays))
     launched = LaunchPoints.joined([LaunchPoints.blank(directions[:0], n_rays), *launches])
-    curves, length, error, attached, occluded, concave = numbers.T
     launched = replace(launched, waves=directions)
+    curves, length, error, attached, occluded, concave = numbers.T
     return ShadowLines(directions, status, curves, length, error, attached, occluded, concave, near, launched)
-
-
-def _one_by_one(body: Surface, directions: FloatArray, n_rays: int, every: bool) -> ShadowLines:
-    """Lines of a body with creases, each by itself."""
-    lines: list[ShadowLine | None] = []
-    for direction in directions:
-        try:
-            lines.append(shadow_line(body, direction, n_points=16))
-        except SingularIncidenceError:
-            lines.append(None)
-    return lines_together(directions, lines, n_rays, every=every)

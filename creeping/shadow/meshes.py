@@ -25,10 +25,10 @@ from creeping.geometry.triangulation import Triangulation, triangulate
 from creeping.kernels.threads import in_slices
 from creeping.shadow.curves import LineNodes
 from creeping.shadow.refinement import halved
-from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, OK
+from creeping.shadow.status import LineStatus
 
-TIERS = ((2_500, 512), (10_000, 2048), (40_000, 4096))
-"""Vertices of the meshes, and nodes of a line on them."""
+TIERS = ((2_500, 512), (10_000, 2048), (40_000, 4096), (160_000, 8192))
+"""Vertices of the meshes, and nodes of a line on them; the last mesh is the one before with every edge halved."""
 
 
 class LineMeshes:
@@ -44,7 +44,7 @@ class LineMeshes:
         If F = 0 has no closed triangulation in its bounds.
     """
 
-    count = len(TIERS) + 1
+    count = len(TIERS)
 
     def __init__(self, body: Surface) -> None:
         # no strong reference: meshes are kept as long as their body lives
@@ -59,19 +59,15 @@ class LineMeshes:
         body: Any = self._body()
         with self._lock:
             if tier not in self._meshes:
-                last = len(TIERS)
-                self._meshes[tier] = (
-                    halved(body, self.mesh(last - 1)) if tier == last else _mesh_of(body, TIERS[tier][0])
-                )
+                last = tier == len(TIERS) - 1
+                self._meshes[tier] = halved(body, self.mesh(tier - 1)) if last else _mesh_of(body, TIERS[tier][0])
             return self._meshes[tier]
 
     def packed(self, tier: int) -> tuple[Any, ...]:
         """Mesh of a tier as `shadow.kernels.trace.lines_on_mesh` takes it."""
         with self._lock:
             if tier not in self._packed:
-                # the last mesh is the one before with every edge halved
-                nodes = 8192 if tier == len(TIERS) else TIERS[tier][1]
-                self._packed[tier] = _packed(self._body(), self.mesh(tier), nodes)  # type: ignore[arg-type]
+                self._packed[tier] = _packed(self._body(), self.mesh(tier), TIERS[tier][1])  # type: ignore[arg-type]
             return self._packed[tier]
 
     def turn(self, tier: int) -> float:
@@ -87,7 +83,7 @@ class LineMeshes:
     def critical(self) -> FloatArray:
         """(n, n x a, x) at both ends of the segments of K = 0: (m, 2, 9)."""
         # the finer the mesh, the fewer small parabolic loops are missed
-        return singular_segments(self._body(), self.mesh(len(TIERS) - 1))  # type: ignore[arg-type]
+        return singular_segments(self._body(), self.mesh(len(TIERS) - 2))  # type: ignore[arg-type]
 
 
 def _mesh_of(body: Surface, vertices: int) -> Triangulation:
@@ -196,7 +192,7 @@ def judged(v: FloatArray, certain: BoolArray, turn: float, tier: int) -> tuple[B
     """
     far = v > turn * turn
     last = tier >= LineMeshes.count - 2
-    code = np.where(certain, np.where(far, OK, NEAR_SINGULAR), FOLLOWED)
+    code = np.where(certain, np.where(far, LineStatus.OK, LineStatus.NEAR_SINGULAR), LineStatus.FOLLOWED)
     onward = ~certain | (~far & (not last))
     return (onward if tier < LineMeshes.count - 1 else np.zeros_like(onward)), code
 

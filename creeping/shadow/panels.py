@@ -166,9 +166,10 @@ def fit_panels(
     todo = [(float(a), float(b)) for a, b in pairwise(keys)]
     done: list[tuple[float, FloatArray, FloatArray, FloatArray]] = []
     while todo:
-        a, Ta = (np.array(part) for part in zip(*(known[key] for key, _ in todo), strict=True))
-        b, Tb = (np.array(part) for part in zip(*(known[key] for _, key in todo), strict=True))
-        shape, speed, good = _fit(body, wave, a, Ta, b, Tb, tolerance)
+        # points and tangents of the first ends, then of the second
+        ends = [np.array(part) for end in (0, 1) for part in zip(*(known[pair[end]] for pair in todo), strict=True)]
+        a, _, b, _ = ends
+        shape, speed, good = _fit(body, wave, ends, tolerance)
         done += [(todo[i][0], a[i], shape[i], speed[i]) for i in np.flatnonzero(good)]
         bad = np.flatnonzero(~good)
         halves = []
@@ -176,7 +177,10 @@ def fit_panels(
             low, high = todo[i]
             middle = _between(low, high)
             if middle not in known:
-                known[middle] = _middle(body, wave, a[i], Ta[i], b[i], Tb[i])
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    guess = _hermite([of[i : i + 1] for of in ends], np.zeros(1))[0]
+                found = moved_onto_lines(body, wave, guess, reach=0.3 * float(np.linalg.norm(b[i] - a[i])), steps=8)
+                known[middle] = found.points[0], found.tangents[0]
             halves += [(low, middle), (middle, high)]
         if len(done) + len(halves) > most or (
             len(bad) and np.min(np.linalg.norm(b - a, axis=1)[bad]) < 1e-11 * size(body)
@@ -222,22 +226,17 @@ def _first_breaks(tangents: FloatArray, last: int) -> list[int]:
 
 
 def _fit(
-    body: Surface,
-    wave: FloatArray,
-    a: FloatArray,
-    Ta: FloatArray,
-    b: FloatArray,
-    Tb: FloatArray,
-    tolerance: float,
+    body: Surface, wave: FloatArray, ends: list[FloatArray], tolerance: float
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Coefficients of x and ds/du of panels from a to b, and whether they are exact."""
+    """Coefficients of x and ds/du of panels from a to b, of ends (a, Ta, b, Tb), and whether they are exact."""
+    a, Ta, b, Tb = ends
     # smallest T.c/|c| on a panel: tangents within 53 degrees of the chord
     least = 0.6
     chord = b - a
     long = np.linalg.norm(chord, axis=1)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         axis = np.repeat(chord / long[:, None], ORDER, axis=0)
-        points = _hermite(a, Ta, b, Tb, _U).reshape(-1, 3)
+        points = _hermite(ends, _U).reshape(-1, 3)
     reach = np.repeat(0.2 * long, ORDER)
     good_ends = np.minimum(np.sum(Ta * chord, axis=1), np.sum(Tb * chord, axis=1)) > least * long
     step = np.zeros_like(points)
@@ -261,26 +260,17 @@ def _fit(
     return shape, speed, np.asarray(good)
 
 
-def _hermite(a: FloatArray, Ta: FloatArray, b: FloatArray, Tb: FloatArray, u: FloatArray) -> FloatArray:
+def _hermite(ends: list[FloatArray], u: FloatArray) -> FloatArray:
     """Cubic over the chords with the tangents of the ends: (p, 3) and (k,) -> (p, k, 3)."""
+    a, Ta, b, Tb = ends
     c = (b - a)[:, None]
     square = np.sum(c * c, axis=-1, keepdims=True)
-    ends = []
+    bumps = []
     for tangent in (Ta, Tb):
         T = tangent[:, None]
         along = np.sum(T * c, axis=-1, keepdims=True)
         # a tangent across the chord says nothing about a graph over it
-        ends.append(np.where(along > 0.2 * np.sqrt(square), 0.5 * (square / along * T - c), 0.0))
+        bumps.append(np.where(along > 0.2 * np.sqrt(square), 0.5 * (square / along * T - c), 0.0))
     v = u[:, None]
-    bump = ends[0] * (1 - v) ** 2 * (1 + v) / 4 - ends[1] * (1 + v) ** 2 * (1 - v) / 4
+    bump = bumps[0] * (1 - v) ** 2 * (1 + v) / 4 - bumps[1] * (1 + v) ** 2 * (1 - v) / 4
     return np.asarray(0.5 * (a + b)[:, None] + 0.5 * v * c + bump)
-
-
-def _middle(
-    body: Surface, wave: FloatArray, a: FloatArray, Ta: FloatArray, b: FloatArray, Tb: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Point of the curve near the middle of the cubic from a to b, with its tangent."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        guess = _hermite(a[None], Ta[None], b[None], Tb[None], np.zeros(1))[0]
-    found = moved_onto_lines(body, wave, guess, reach=0.3 * float(np.linalg.norm(b - a)), steps=8)
-    return found.points[0], found.tangents[0]

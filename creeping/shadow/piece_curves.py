@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray
-from creeping.geodesics.pieces import REACH
+from creeping.geodesics.pieces import REACH, to_tips
 from creeping.geometry.piecewise import Tiles, nearest_crease, piece_ahead, tips_of
 from creeping.geometry.surface import size
 from creeping.shadow.curves import Moved, moved_onto_lines, tangents_at
@@ -127,7 +127,7 @@ class _Walk:
         edge = self._reach / ASTRAY
         found = self._corrected(points, 0.5 * edge, 12)
         x = found.points[self._solved(found) & (np.linalg.norm(found.points - points, axis=1) < edge)]
-        kept: FloatArray = x[self.inside(x) & ~(self._to_tip(x) <= REACH * self.size)]
+        kept: FloatArray = x[self.inside(x) & ~(to_tips(self.tips, x) <= REACH * self.size)]
         return kept
 
     def _solved(self, found: Moved) -> BoolArray:
@@ -137,11 +137,6 @@ class _Walk:
         """Whether points of the line are of this piece (n,), and not of a sheet of its F far from the body."""
         near = np.isfinite(self._tree.query(x, distance_upper_bound=self._reach)[0])
         return np.asarray(near & (piece_ahead(self.body, x, self.direction) == self.number))
-
-    def _to_tip(self, x: FloatArray) -> FloatArray:
-        if not len(self.tips):
-            return np.full(len(x), np.inf)
-        return np.asarray(np.min(np.linalg.norm(x[:, None] - self.tips, axis=2), axis=1))
 
     def whole(self, seed: FloatArray) -> PieceCurve | None:
         """The curve through a seed; None where the seed has no tangent or the curve no length."""
@@ -174,7 +169,7 @@ class _Walk:
         nodes, T, h = [start], T0, longest * self.size
         while len(nodes) < most:
             x = nodes[-1]
-            tip = float(self._to_tip(x[None])[0])
+            tip = float(to_tips(self.tips, x[None])[0])
             if tip <= REACH * self.size:
                 return np.array(nodes), False, *self._end(x, tip)
             h = min(h, longest * self.size, max(0.5 * tip, 0.5 * REACH * self.size))

@@ -20,6 +20,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
@@ -33,7 +34,7 @@ from creeping.shadow.curve import ShadowCurve
 from creeping.shadow.curves import moved_onto_lines
 from creeping.shadow.panels import LENGTH_TOLERANCE, PanelCurve, fit_panels
 from creeping.shadow.piece_curves import EDGE_ON, PieceCurve, curves_on, edge_on
-from creeping.shadow.status import ATTACHED, CONCAVE, NO_RAY, OCCLUDED, STATUSES
+from creeping.shadow.status import STATUSES, PointState
 
 MEET = 1e-7
 """Distance of the ends of two curves, in body sizes, up to which they meet, and least length of a curve."""
@@ -127,7 +128,7 @@ def _finished(
         arclength=arclength,
         length=panels.length,
         error=LENGTH_TOLERANCE,
-        status=np.full(n_points, STATUSES[ATTACHED]),
+        status=np.full(n_points, STATUSES[PointState.ATTACHED]),
         curvature=curvature,
         arcs=arcs,
         nodes=points,
@@ -145,7 +146,7 @@ def _states(body: Any, piece: Any, direction: FloatArray, points: FloatArray) ->
     convex = moved_onto_lines(piece, direction, points, reach=0.0, steps=0).curvature > 0
     # asked a little off the body: along a straight generator F is 0 up to rounding
     hidden = occluded(body, points + 1e-9 * size(body) * unit_normals(piece, points), direction)
-    return np.where(convex, np.where(hidden, OCCLUDED, ATTACHED), CONCAVE)
+    return np.where(convex, np.where(hidden, PointState.OCCLUDED, PointState.ATTACHED), PointState.CONCAVE)
 
 
 def _arcs(body: Any, piece: Any, direction: FloatArray, panels: PanelCurve) -> tuple[tuple[float, float, str], ...]:
@@ -204,22 +205,18 @@ def launched_from(curves: tuple[ShadowCurve, ...], arcs: list[Arc], direction: F
 
     Half a spacing from the ends of an arc, where kappa_n, the illumination or the piece ends.
     """
-    points, arclength = np.full((n_rays, 3), np.nan), np.full(n_rays, np.nan)
-    curve_index = np.full(n_rays, NO_RAY, np.int16)
-    arc_index, spacing, closed, state = (np.full(n_rays, np.nan) for _ in range(4))
+    launch, first = LaunchPoints.blank(direction[None], n_rays), 0
     long = np.array([arc.end - arc.start for arc in arcs])
-    first = 0
     for number, count in enumerate(shared_out(long, n_rays)):
-        arc, rows = arcs[number], slice(first, first + count)
+        arc, rows = arcs[number], (0, slice(first, first + count))
         curve = curves[arc.curve]
         place = arc.start + long[number] * (np.arange(count) + (0.0 if arc.closed else 0.5)) / max(count, 1)
         place = np.mod(place, curve.length)
-        points[rows], arclength[rows], curve_index[rows] = curve.at(place), place, arc.curve
-        arc_index[rows], spacing[rows], closed[rows] = number, long[number] / max(count, 1), arc.closed
-        state[rows] = curve.state_at(place)
+        launch.points[rows], launch.arclength[rows], launch.curve_index[rows] = curve.at(place), place, arc.curve
+        launch.arc_index[rows], launch.spacing[rows] = number, long[number] / max(count, 1)
+        launch.closed[rows], launch.state[rows] = arc.closed, curve.state_at(place)
         first += count
-    columns: tuple[Any, ...] = (points, arclength, curve_index, arc_index, spacing, closed, state)
-    return LaunchPoints(direction[None], *(column[None] for column in columns))
+    return launch
 
 
 class EdgePart(NamedTuple):
@@ -292,17 +289,24 @@ def _runs(
 ) -> list[list[tuple[FloatArray, float]]]:
     """Runs of the parts of one edge on the line, each the ends (2, 3) and the length of parts one after the other."""
     s = [unit_normals(side, x) @ direction + EDGE_ON for side in sides]
+    long = np.linalg.norm(np.diff(x, axis=0), axis=1)
+    # ascending even where two points are one
+    t = np.append(0.0, np.cumsum(np.maximum(long, 1e-12 * long.sum())))
+    curve, (points, weights) = CubicHermiteSpline(t, x, e), gauss_rule(5)
     runs: list[list[tuple[FloatArray, float]]] = []
+
+    def off(at: float, side: Any) -> float:
+        return float(unit_normals(side, curve([at]))[0] @ direction + EDGE_ON)
+
     for k in np.flatnonzero(is_convex[:-1] & is_convex[1:]):
-        ends = x[k : k + 2], e[k : k + 2]
-        cuts = [_cut(*ends, side, direction) for side, v in zip(sides, s, strict=True) if (v[k] < 0) != (v[k + 1] < 0)]
-        shares = [0.0, *sorted(cuts), 1.0]
-        for low, high in pairwise(shares):
-            middle = _cubic(*ends, np.array([0.5 * (low + high)]))
-            one, two = (unit_normals(side, middle)[0] @ direction < -EDGE_ON for side in sides)
+        crossed = [side for side, v in zip(sides, s, strict=True) if (v[k] < 0) != (v[k + 1] < 0)]
+        cuts = sorted(brentq(off, t[k], t[k + 1], args=(side,), xtol=1e-12 * (t[k + 1] - t[k])) for side in crossed)
+        for low, high in pairwise([t[k], *cuts, t[k + 1]]):
+            one, two = (off(0.5 * (low + high), side) < 0 for side in sides)
             if one == two or not high > low:
                 continue
-            part = _cubic(*ends, np.array([low, high])), _length(*ends, low, high)
+            slopes = np.linalg.norm(curve(low + (high - low) * points, 1), axis=1)
+            part = curve([low, high]), float((high - low) * np.sum(weights * slopes))
             if runs and _meet(runs[-1][-1], part):
                 runs[-1].append(part)
             else:
@@ -314,24 +318,3 @@ def _runs(
 
 def _meet(before: tuple[FloatArray, float], after: tuple[FloatArray, float]) -> bool:
     return bool(np.linalg.norm(before[0][-1] - after[0][0]) <= 1e-9 * (before[1] + after[1]))
-
-
-def _cut(x: FloatArray, e: FloatArray, side: Any, direction: FloatArray) -> float:
-    """Share of a segment at which n.d of one side changes its sign."""
-    return float(brentq(lambda u: unit_normals(side, _cubic(x, e, np.array([u])))[0] @ direction + EDGE_ON, 0.0, 1.0))
-
-
-def _cubic(x: FloatArray, e: FloatArray, u: FloatArray) -> FloatArray:
-    """Points at shares u (n,) of the cubic between two points with unit tangents: (n, 3), L."""
-    h, v = float(np.linalg.norm(x[1] - x[0])), u[:, None]
-    at = (1 - v) ** 2 * (1 + 2 * v) * x[0] + v**2 * (3 - 2 * v) * x[1]
-    return np.asarray(at + h * v * (1 - v) * ((1 - v) * e[0] - v * e[1]))
-
-
-def _length(x: FloatArray, e: FloatArray, low: float, high: float) -> float:
-    """Length of the cubic from a share to another, L."""
-    points, weights = gauss_rule(5)
-    u = (low + (high - low) * points)[:, None]
-    chord, h = x[1] - x[0], float(np.linalg.norm(x[1] - x[0]))
-    slope = 6 * u * (1 - u) * chord + h * ((1 - u) * (1 - 3 * u) * e[0] + u * (3 * u - 2) * e[1])
-    return float((high - low) * np.sum(weights * np.linalg.norm(slope, axis=1)))

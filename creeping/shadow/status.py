@@ -4,19 +4,38 @@ A point is attached (it launches a creeping ray), occluded (the incident ray is 
 (kappa_n(d) <= 0: the incident ray touches from inside).
 """
 
-ATTACHED, OCCLUDED, CONCAVE = range(3)
-STATUSES = ("attached", "occluded", "concave")
+from enum import IntEnum
+
+
+class PointState(IntEnum):
+    """Codes of points."""
+
+    ATTACHED = 0
+    OCCLUDED = 1
+    CONCAVE = 2
+
+
+STATUSES = tuple(one.name.lower() for one in PointState)
 """Names of the codes of points."""
-
-OK, NEAR_SINGULAR, FOLLOWED, SINGULAR, FAILED = range(5)
-INCIDENCE_STATUSES = {
-    OK: "ok",
-    NEAR_SINGULAR: "near singular: the number of curves is not certain",
-    FOLLOWED: "followed one by one: the meshes did not resolve the line",
-    SINGULAR: "singular: the line crosses itself, and there are no rays",
-    FAILED: "failed: an error, nothing is given",
-}
-"""Meanings of the codes of incidences."""
-
 NO_RAY = -1
 """Status of a place for a ray that the incidence did not fill."""
+
+
+class LineStatus(IntEnum):
+    """Codes of lines, one for each incidence."""
+
+    OK = 0
+    NEAR_SINGULAR = 1
+    FOLLOWED = 2
+    SINGULAR = 3
+    FAILED = 4
+
+
+INCIDENCE_STATUSES = {
+    LineStatus.OK: "ok",
+    LineStatus.NEAR_SINGULAR: "near singular: the number of curves is not certain",
+    LineStatus.FOLLOWED: "followed one by one: the meshes did not resolve the line",
+    LineStatus.SINGULAR: "singular: the line crosses itself, and there are no rays",
+    LineStatus.FAILED: "failed: an error, nothing is given",
+}
+"""Meanings of the codes of incidences."""

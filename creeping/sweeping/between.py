@@ -31,7 +31,7 @@ from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.waves.far_geometry import FarGeometry
 from creeping.field.waves.far_rays import Parts, isolated, sheets_of
 from creeping.rays.transport import Flow
-from creeping.shadow.status import FOLLOWED, OK
+from creeping.shadow.status import LineStatus
 from creeping.sweeping.lattice import FINER, Lattice
 from creeping.sweeping.request import LINE, SHARES, VALID, SweepRequest
 from creeping.sweeping.sweeper import Arrays, FieldArrays, Passed, Sweeper
@@ -331,7 +331,9 @@ class FieldsBetween:
         # of those that have passed, from the corners of their cells and the sums
         done, some = np.flatnonzero(passed), rows[passed]
         known = {name: nodes.results[name][inside[done]] for name in (*LINE, *VALID)}
-        out["incidence_status"][some] = np.where(np.any(known["incidence_status"] == FOLLOWED, axis=1), FOLLOWED, OK)
+        out["incidence_status"][some] = np.where(
+            np.any(known["incidence_status"] == LineStatus.FOLLOWED, axis=1), LineStatus.FOLLOWED, LineStatus.OK
+        )
         out["curves"][some], out["line_length"][some] = known["curves"][:, 0], length[done]
         out["line_error"][some] = known["line_error"].max(axis=1)
         out["singular_distance"][some] = known["singular_distance"].min(axis=1)

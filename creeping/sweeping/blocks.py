@@ -21,7 +21,7 @@ from creeping.errors import CreepingError
 from creeping.geometry.piecewise import is_piecewise
 from creeping.geometry.surface import Surface, why_no_rays
 from creeping.rays.transport import Flow
-from creeping.shadow.status import FAILED
+from creeping.shadow.status import LineStatus
 from creeping.sweeping.results import MISSING, count_attributes, require
 from creeping.sweeping.run import Progress, sweep_directions
 from creeping.sweeping.store import SweepStore
@@ -174,7 +174,7 @@ def _joined(parts: list[xarray.Dataset], count: int) -> xarray.Dataset:
     found = require("xarray").concat(parts, dim="wavenumber", combine_attrs="override", **options)
     each = np.stack([one["incidence_status"].values for one in parts])
     status = np.where(np.any(each == MISSING, axis=0) | (len(parts) < count), MISSING, each.max(axis=0))
-    status = np.where(np.any(each == FAILED, axis=0), FAILED, status)
+    status = np.where(np.any(each == LineStatus.FAILED, axis=0), LineStatus.FAILED, status)
     words = count_attributes(status, [])
     texts = dict.fromkeys(text for one in parts for text in str(one.attrs.get("errors", "")).splitlines())
     words |= {"errors": "\n".join(texts)} if texts else {}

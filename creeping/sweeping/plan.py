@@ -23,7 +23,7 @@ from creeping.geometry.surface import Surface, fingerprint
 from creeping.phaseflow.cache import load_phase_map
 from creeping.phaseflow.phase_map import PhaseMap
 from creeping.rays.transport import Flow
-from creeping.shadow.status import FAILED
+from creeping.shadow.status import LineStatus
 from creeping.storage.folder import content_digest
 from creeping.sweeping.between import FieldsBetween
 from creeping.sweeping.request import SweepRequest
@@ -159,7 +159,7 @@ def compute(sweeper: Sweeper | FieldsBetween, incidences: FloatArray) -> tuple[A
             joined = {name: np.concatenate([piece[0][name] for piece in pieces]) for name in pieces[0][0]}
             return joined, {row: piece[1][0] for row, piece in enumerate(pieces) if piece[1]}
         return sweeper.request.empty(1), {0: f"{type(error).__name__}: {error}"}
-    for row in np.flatnonzero(arrays["incidence_status"] == FAILED):
+    for row in np.flatnonzero(arrays["incidence_status"] == LineStatus.FAILED):
         errors[int(row)] = "no reason is known"
     return arrays, errors
 

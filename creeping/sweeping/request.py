@@ -20,7 +20,7 @@ from creeping.geometry.directions import unit_directions
 from creeping.geometry.evaluators import speed_of
 from creeping.geometry.surface import Surface, why_no_rays
 from creeping.rays.reach import AUTO, asked_length, body_length
-from creeping.shadow.status import FAILED, INCIDENCE_STATUSES
+from creeping.shadow.status import INCIDENCE_STATUSES, LineStatus
 from creeping.sweeping.lattice import Lattice, lattice_of
 
 Quantity = Literal["rays", "monostatic", "bistatic"]
@@ -256,7 +256,7 @@ class SweepRequest:
         if not filled:
             return {name: np.empty(shapes[name], dtype=v.dtype) for name, v in self.variables.items()}
         out = {name: np.full(shapes[name], v.fill, dtype=v.dtype) for name, v in self.variables.items()}
-        out["incidence_status"][:] = FAILED
+        out["incidence_status"][:] = LineStatus.FAILED
         return out
 
 

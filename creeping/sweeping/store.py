@@ -26,7 +26,7 @@ from creeping._typing import Any, IntArray
 from creeping.errors import CreepingError, InvalidInputError
 from creeping.geometry.surface import Surface
 from creeping.rays.transport import Flow
-from creeping.shadow.status import FAILED
+from creeping.shadow.status import LineStatus
 from creeping.storage.atomic import bytes_of
 from creeping.storage.folder import content_digest
 from creeping.sweeping import layout
@@ -239,7 +239,7 @@ class SweepStore:
         found: list[tuple[int, str]] = []
         for task in np.flatnonzero(self.status() == TaskStatus.WITH_FAILURES):
             first = self.rows(int(task)).start
-            failed, texts = self.read("incidence_status", int(task)) == FAILED, self.read(ERRORS, int(task))
+            failed, texts = self.read("incidence_status", int(task)) == LineStatus.FAILED, self.read(ERRORS, int(task))
             for row in np.flatnonzero(failed):
                 found.append((first + int(row), bytes(texts[row]).rstrip(b"\0").decode(errors="replace")))
             if len(found) >= SHOWN:

@@ -43,7 +43,7 @@ from creeping.rays.strips import Strip, strips_of
 from creeping.rays.tracer import RayTracer
 from creeping.rays.transport import Flow, carried
 from creeping.shadow.line import ShadowLine, ShadowLines, lines_together, shadow_line, shadow_lines
-from creeping.shadow.status import OK, SINGULAR
+from creeping.shadow.status import LineStatus
 from creeping.sweeping.request import CURVED, VALID, SweepRequest
 
 BY_OBSERVER = ("total", "creeping", "reflected", "forward", "error", "unresolved")
@@ -135,7 +135,7 @@ class Sweeper:
         incidences = np.asarray(incidences, dtype=float)
         out = self.request.empty(len(incidences))
         if self._together:
-            out["incidence_status"][:] = OK
+            out["incidence_status"][:] = LineStatus.OK
             self._fill_together(incidences, out)
             return out
         # rays at a time, so that what is known of them stays in the caches; fields are assembled by many calls on few
@@ -211,7 +211,7 @@ class Sweeper:
         if request.quantity == "rays":
             fill_rays(self.flow, lines, request.travel_times, out)
             return None
-        singular = lines.status == SINGULAR
+        singular = lines.status == LineStatus.SINGULAR
         if request.order == 2 and request.method != "rays":
             self._fill_without_lines(incidences, np.flatnonzero(singular), out)
         rows = np.flatnonzero(~singular)
@@ -334,7 +334,7 @@ def _by_currents(fan: RayFan, observers: FloatArray, wavenumber: float, boundary
 
 def fill_lines(lines: ShadowLines, out: dict[str, Any]) -> None:
     """Results of the lines."""
-    known = lines.status != SINGULAR
+    known = lines.status != LineStatus.SINGULAR
     out["incidence_status"][:] = lines.status
     out["curves"][known] = lines.curves[known]
     out["line_length"][:], out["line_error"][:] = lines.length, lines.error

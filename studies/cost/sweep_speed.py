@@ -21,7 +21,7 @@ from creeping._typing import Any, FloatArray
 from creeping.geometry.directions import fibonacci_directions, great_circle
 from creeping.phaseflow.request import tuned_direct
 from creeping.shadow.line import shadow_lines
-from creeping.shadow.status import FOLLOWED, INCIDENCE_STATUSES, NEAR_SINGULAR, OK, SINGULAR, STATUSES
+from creeping.shadow.status import INCIDENCE_STATUSES, STATUSES, LineStatus
 from creeping.sweeping.request import sweep_request
 from creeping.sweeping.sweeper import Sweeper
 from studies import Row, main
@@ -193,7 +193,7 @@ def independent(body: Any, directions: FloatArray) -> tuple[Lines, float]:
         try:
             line = cr.shadow_line(body, d)
         except cr.SingularIncidenceError:
-            lines.status[row] = SINGULAR
+            lines.status[row] = LineStatus.SINGULAR
             continue
         lines.curves[row], lines.length[row] = len(line.curves), line.length
         lines.shares[row] = [line.fractions[name] for name in STATUSES]
@@ -202,8 +202,8 @@ def independent(body: Any, directions: FloatArray) -> tuple[Lines, float]:
 
 def differences(found: Lines, exact: Lines) -> Row:
     """Lines that differ in the number of curves, and worst errors: of status OK, and of all (in brackets)."""
-    both = np.isfinite(found.length) & np.isfinite(exact.length) & (exact.status < SINGULAR)
-    certain = both & (found.status == OK)
+    both = np.isfinite(found.length) & np.isfinite(exact.length) & (exact.status < LineStatus.SINGULAR)
+    certain = both & (found.status == LineStatus.OK)
     length = np.abs(found.length / np.where(both, exact.length, 1.0) - 1)
     share = np.abs(found.shares - exact.shares)
     row: Row = {}
@@ -221,7 +221,7 @@ def lines(names: tuple[str, ...] = LINE_BODIES, count: int = 1000) -> Iterator[R
     for name in names:
         found = swept(body(name), directions)
         row: Row = {"body": name, "us a line": 1e6 * seconds_of(partial(swept, body(name), directions)) / count}
-        for code in (OK, NEAR_SINGULAR, FOLLOWED, SINGULAR):
+        for code in (LineStatus.OK, LineStatus.NEAR_SINGULAR, LineStatus.FOLLOWED, LineStatus.SINGULAR):
             row[INCIDENCE_STATUSES[code].split(":")[0]] = int(np.sum(found.status == code))
         counts = np.unique(found.curves[np.isfinite(found.curves)]).astype(int)
         least = float(np.min(found.singular_distance))

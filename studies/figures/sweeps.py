@@ -12,7 +12,7 @@ from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
 from creeping.field.results.comparison import cross_section_decibels
 from creeping.geometry.directions import directions_from_angles, great_circle, theta_phi_grid
 from creeping.plotting.pages import COLOURS, EXACT, new_figure
-from creeping.shadow.status import NEAR_SINGULAR, SINGULAR
+from creeping.shadow.status import LineStatus
 from studies.figures.drawing import plain_ticks
 from tests.reference import sphere
 
@@ -44,7 +44,7 @@ def cross_section(path: Path, quick: bool) -> dict[str, Any]:
         flow = cr.DirectFlow(body, rtol=1e-6)
         found = cr.sweep_directions(flow, directions, wavenumbers=K, boundary=BOUNDARIES)
         levels, bad = cross_sections(found), unresolved_of(found)
-        near = found["incidence_status"].values == NEAR_SINGULAR
+        near = found["incidence_status"].values == LineStatus.NEAR_SINGULAR
         maps[name] = levels, bad, near
         cards[name] = {
             "against_one_by_one_dB": agreement(found, flow, found.attrs["length"]),
@@ -79,7 +79,7 @@ def cross_sections(found: Any) -> dict[str, FloatArray]:
 
 def unresolved_of(found: Any) -> dict[str, BoolArray]:
     """Directions in which an expansion fails or nothing is known, by boundary (n,)."""
-    missing = found["incidence_status"].values >= SINGULAR
+    missing = found["incidence_status"].values >= LineStatus.SINGULAR
     scalar = found["unresolved"].values[:, :, 0]
     return {
         "soft": missing | scalar[:, 0],

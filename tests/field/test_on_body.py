@@ -182,7 +182,7 @@ def test_ground_that_is_flat_or_concave_is_not_exact(across):
     cosine, along = np.array([1.0, 0.9, 0.5, 1.0, 0.5]), np.array([0.0, 0.0, 0.0, -1.0, -1.0])
     zero, vectors = np.zeros(5), np.zeros((5, 3))
     part = LitNodes(vectors, vectors, zero, cosine, along, across + zero, zero, zero, vectors, zero)
-    u, other = (lit_currents(cosine, along, across + zero, zero, zero, zero, 30.0, HARD, o) for o in (2, 1))
+    u, other = (lit_currents(part.ground, 30.0, HARD, o) for o in (2, 1))
     low, high = (lit_error(part, np.abs(u), np.abs(u - other), k, HARD, 2, 1.7) for k in (30.0, 60.0))
     assert np.all(low > 0.01) and np.all(high < low)
 

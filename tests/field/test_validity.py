@@ -18,7 +18,7 @@ from creeping.field.validity_range import (
 from creeping.geodesics.equations import sharpest_curvature
 from creeping.rays.reach import early_length
 from creeping.shadow.line import shadow_lines
-from creeping.shadow.status import SINGULAR
+from creeping.shadow.status import LineStatus
 
 
 def fan_of(body, d, length=2.0):
@@ -54,7 +54,7 @@ def test_many_incidences_have_what_each_has(body):
     until = 0.6 * early_length(body, ks[0])
     least, largest = validities(body, lines.launch, until, ks)
     steps = max(8, int(np.ceil(until * sharpest_curvature(body) / TURN)))
-    for row in np.flatnonzero(lines.status != SINGULAR):
+    for row in np.flatnonzero(lines.status != LineStatus.SINGULAR):
         line = cr.shadow_line(body, directions[row])
         options = {"length": until, "n_rays": SOME, "n_steps": steps, "max_gap": np.inf}
         fan = cr.launch(cr.DirectFlow(body), line, **options)

@@ -9,7 +9,7 @@ from creeping.field.validity_range import launch_validity, validities
 from creeping.rays.fan import launch
 from creeping.rays.reach import early_length
 from creeping.shadow.line import shadow_line, shares_of
-from creeping.shadow.status import NO_RAY, OK, SINGULAR
+from creeping.shadow.status import NO_RAY, LineStatus
 
 PARTS_OF_FIELD = ("total", "creeping", "reflected", "forward", "unresolved", "error")
 
@@ -27,10 +27,10 @@ class PlainSweeper:
             try:
                 line = shadow_line(self.flow.body, direction)
             except SingularIncidenceError as error:
-                one["incidence_status"][0] = SINGULAR
+                one["incidence_status"][0] = LineStatus.SINGULAR
                 one["singular_distance"][0] = getattr(error, "distance", 0.0)
                 continue
-            known = {"incidence_status": OK, "curves": len(line.curves), "line_length": line.length}
+            known = {"incidence_status": LineStatus.OK, "curves": len(line.curves), "line_length": line.length}
             known |= {"line_error": line.nodes.error, "singular_distance": line.singular_distance, **shares_of(line)}
             for name, value in known.items():
                 one[name][0] = value

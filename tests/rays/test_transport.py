@@ -8,7 +8,7 @@ from oracles.plain_sweep import PlainSweeper
 
 import creeping as cr
 from creeping.rays.ends import RayStatus
-from creeping.shadow.status import FAILED, NO_RAY, OK, SINGULAR
+from creeping.shadow.status import NO_RAY, LineStatus
 from creeping.sweeping.request import sweep_request
 from creeping.sweeping.sweeper import Sweeper
 
@@ -32,7 +32,7 @@ def test_agrees_with_launch(name, rng):
         assert found[name].dtype == plain[name].dtype == np.dtype(variable.dtype)
         assert found[name].shape == plain[name].shape
         np.testing.assert_array_equal(found[name], plain[name], err_msg=name)
-    assert np.all(found["incidence_status"] == OK)
+    assert np.all(found["incidence_status"] == LineStatus.OK)
 
 
 @pytest.mark.parametrize("quantity", ["rays", "monostatic"])
@@ -54,13 +54,13 @@ def test_an_incidence_does_not_depend_on_its_company(quantity, rng):
 def test_singular_incidences_give_nothing():
     body = BODIES["torus"]
     found = Sweeper(cr.DirectFlow(body), sweep_request("rays", length=1.0, n_rays=16))(np.eye(3))
-    assert found["incidence_status"].tolist() == [SINGULAR, SINGULAR, OK]
+    assert found["incidence_status"].tolist() == [LineStatus.SINGULAR, LineStatus.SINGULAR, LineStatus.OK]
     assert np.all(found["ray_status"][:2] == NO_RAY) and np.all(np.isnan(found["points"][:2]))
     assert np.all(np.isfinite(found["points"][2]))
     field = sweep_request("monostatic", length=4.0, n_rays=64, wavenumbers=[20.0], boundary="soft")
     found = Sweeper(cr.DirectFlow(body), field)(np.eye(3)[:2])
     assert np.all(np.isnan(found["creeping"]))
-    assert FAILED not in found["incidence_status"]
+    assert LineStatus.FAILED not in found["incidence_status"]
 
 
 def test_non_smooth_regions_ends_rays():

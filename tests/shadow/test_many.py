@@ -13,7 +13,7 @@ from creeping.shadow.curves import Curves
 from creeping.shadow.line import shadow_lines
 from creeping.shadow.meshes import LineMeshes, neighbours_of, prepared
 from creeping.shadow.refinement import followed
-from creeping.shadow.status import FOLLOWED, NEAR_SINGULAR, NO_RAY, OK, SINGULAR
+from creeping.shadow.status import NO_RAY, LineStatus
 
 BODIES = {
     "triaxial": lambda: sc.Ellipsoid(1.2, 0.8, 0.6),
@@ -30,7 +30,7 @@ def test_is_the_shadow_line_of_each_and_that_of_panels(name, rng):
     body = BODIES[name]()
     d = directions(rng, 12)
     lines = shadow_lines(body, d, 64)
-    for row in np.flatnonzero(lines.status == OK):
+    for row in np.flatnonzero(lines.status == LineStatus.OK):
         line = cr.shadow_line(body, d[row])
         assert lines.curves[row] == len(line.curves)
         assert lines.length[row] == pytest.approx(line.length, rel=1e-14)
@@ -42,7 +42,7 @@ def test_is_the_shadow_line_of_each_and_that_of_panels(name, rng):
         shares = finished(body, Curves.of(rows_of(line.wave)[None], [nodes]), 0).shares[0]
         assert list(line.fractions.values()) == pytest.approx(list(shares), abs=1e-8)
         assert lines.singular_distance[row] == pytest.approx(distance, abs=2e-3)
-    assert np.mean(lines.status == OK) > 0.8
+    assert np.mean(lines.status == LineStatus.OK) > 0.8
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_is_the_shadow_line_of_each_and_that_of_panels(name, rng):
 )
 def test_published_lines(name, direction, length, shares):
     lines = shadow_lines(BODIES[name](), unit([direction]), 32)
-    assert lines.status[0] == OK
+    assert lines.status[0] == LineStatus.OK
     assert lines.length[0] == pytest.approx(length, rel=LINE_LENGTH)
     if shares:
         assert [getattr(lines, s)[0] for s in STATUSES] == pytest.approx(shares, abs=FRACTION)
@@ -100,10 +100,10 @@ def test_singular_incidences_are_refused_and_those_near_reported():
     body = BODIES["torus"]()
     near = [unit([1, 0, v]) for v in (1e-8, 1e-5, 1e-3, 0.3)]
     lines = shadow_lines(body, np.array(near), 32)
-    assert lines.status[0] == SINGULAR
+    assert lines.status[0] == LineStatus.SINGULAR
     assert np.isnan(lines.length[0]) and np.all(lines.launch.curve_index[0] == NO_RAY)
-    assert lines.status[1] in (SINGULAR, NEAR_SINGULAR, FOLLOWED)
-    assert lines.status[3] == OK
+    assert lines.status[1] in (LineStatus.SINGULAR, LineStatus.NEAR_SINGULAR, LineStatus.FOLLOWED)
+    assert lines.status[3] == LineStatus.OK
     np.testing.assert_allclose(lines.singular_distance[2:], [1e-3, near[3][2]], rtol=1e-3)
 
 
@@ -114,7 +114,7 @@ def test_what_the_meshes_do_not_resolve_is_followed():
     z, turn = 1 - (2 * i + 1) / 1000, i * np.pi * (3 - np.sqrt(5))
     d = np.stack([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z], axis=1)
     lines, line = shadow_lines(body, d, 128), cr.shadow_line(body, d[0])
-    assert lines.status[0] in (FOLLOWED, NEAR_SINGULAR)
+    assert lines.status[0] in (LineStatus.FOLLOWED, LineStatus.NEAR_SINGULAR)
     assert lines.curves[0] == len(line.curves) == 2
     assert lines.length[0] == pytest.approx(line.length, rel=1e-6)
     assert np.sum(lines.launch.spacing[0]) == pytest.approx(line.length * line.fractions["attached"], rel=1e-6)
@@ -162,7 +162,7 @@ def test_thousand_directions_against_the_finest_mesh(name, monkeypatch):
     meshes = prepared(body)
     monkeypatch.setattr(meshes, "_packed", {tier: meshes.packed(2) for tier in range(meshes.count)})
     exact = shadow_lines(body, d, 32)
-    certain = (found.status == OK) & (exact.status == OK)
+    certain = (found.status == LineStatus.OK) & (exact.status == LineStatus.OK)
     assert np.mean(certain) > 0.98
     np.testing.assert_array_equal(found.curves[certain], exact.curves[certain])
     assert np.max(np.abs(found.length / exact.length - 1)[certain]) < 3e-8

@@ -10,7 +10,7 @@ import pytest
 
 from creeping import CreepingError
 from creeping.geometry.directions import fibonacci_directions
-from creeping.shadow.status import FAILED
+from creeping.shadow.status import LineStatus
 from creeping.sweeping import cluster
 from creeping.sweeping.run import fill
 from creeping.sweeping.store import SweepStore
@@ -58,7 +58,7 @@ def test_poison_costs_its_incidence_alone(two, tmp_path, monkeypatch):
     store = SweepStore.create(tmp_path / "s.zarr", plan)
     assert fill(plan, store, client=two)
     ds = store.dataset()
-    assert np.flatnonzero(ds.incidence_status == FAILED).tolist() == [13, 21]
+    assert np.flatnonzero(ds.incidence_status == LineStatus.FAILED).tolist() == [13, 21]
     good = np.delete(np.arange(40), [13, 21])
     assert np.array_equal(ds.creeping.values[good], fake.creeping_of(40)[good])
     assert store.failures() == [

@@ -6,7 +6,7 @@ import shared_bodies as sc
 
 import creeping as cr
 from creeping.field.results.labelled import power
-from creeping.shadow.status import SINGULAR
+from creeping.shadow.status import LineStatus
 from creeping.sweeping.echoes import echo_of, monostatic_method
 from tests.reference import sphere
 
@@ -147,7 +147,7 @@ def test_lines_that_cross_themselves_leave_their_echoes_to_the_equation(monkeypa
     monkeypatch.setattr("creeping.field.routes.is_reached", lambda *_: True)
     ds = cr.backscatter(sc.Torus(1.0, 0.4), **asked)
     np.testing.assert_allclose(ds.field.total, alone.field.total, atol=float(alone.field.error.max()))
-    assert ds["incidence_status"].values.tolist() == [SINGULAR] * 2 and np.all(ds["by_currents"])
+    assert ds["incidence_status"].values.tolist() == [LineStatus.SINGULAR] * 2 and np.all(ds["by_currents"])
     total, error = ds.field.total.values.squeeze(), ds.field.error.values.squeeze()
     assert abs(total[0] - total[1]) < error.sum() < 0.01 * abs(total[0])
     exact = cr.solve(sc.Torus(1.0, 0.4), (-1, 0, 0), wavenumber=4.0, boundary="hard").backscatter()

@@ -10,7 +10,7 @@ import xarray
 from filelock import FileLock
 
 import creeping as cr
-from creeping.shadow.status import FAILED
+from creeping.shadow.status import LineStatus
 from creeping.sweeping.plan import SweepPlan
 from creeping.sweeping.request import sweep_request
 from creeping.sweeping.results import as_dataset, without_complex
@@ -203,7 +203,7 @@ def test_poison_costs_one_incidence_and_is_tried_again(tmp_path, monkeypatch):
     monkeypatch.setenv("FAKE_RAISES", " ".join(map(str, bad)))
     plan, store = filled(tmp_path / "s.zarr")
     ds = store.dataset()
-    assert np.flatnonzero(ds.incidence_status == FAILED).tolist() == [5, 17]
+    assert np.flatnonzero(ds.incidence_status == LineStatus.FAILED).tolist() == [5, 17]
     assert np.flatnonzero(np.isnan(ds["creeping"][:, 0, 0])).tolist() == [5, 17]
     assert store.failures() == [
         (5, "ArithmeticError: a poisonous incidence"),

@@ -26,7 +26,6 @@ egg and the twisted ellipsoid.
 Sources: [F46], [CK13, sec. 6.2]; [C93], [P82]; Derivations, F18, F22, F24, F26 and F31.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar
@@ -38,12 +37,7 @@ from creeping.field.arguments import fock_parameter, scales, transverse_ratios
 from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT
 from creeping.field.currents.lit import STEEPEST, lit_conductor
 from creeping.field.currents.nodes import LitNodes, RayNodes
-from creeping.field.currents.radiation import (
-    electric_field_of_vector,
-    far_of_vector,
-    magnetic_field_of_vector,
-    received_vectors,
-)
+from creeping.field.currents.radiation import far_of_vector, field_of_vector, received_vectors
 from creeping.field.currents.whole_body import SurfaceCurrents, level_at
 from creeping.field.fock import surface_function
 from creeping.field.marching.fan_rays import FLAT
@@ -109,8 +103,8 @@ class ConductorCurrents(SurfaceCurrents):
         scattered = np.concatenate([self.scattered_electric(points), self.scattered(points)], axis=1)
         left, (lit, shadow, factor) = self.left_of_each, self._levels
         shapes = (
-            self._changed(electric_field_of_vector, points) / self._electric_inside,
-            self._changed(magnetic_field_of_vector, points) / self._change_inside,
+            self._changed(points, electric=True) / self._electric_inside,
+            self._changed(points, electric=False) / self._change_inside,
         )
         level = np.stack([level_at(self, points, dark, float(mean), lit, shadow) for mean in self._amplitude], axis=1)
         each = [part * np.hypot(level, factor * shape) for part, shape in zip(left, shapes, strict=True)]
@@ -121,10 +115,11 @@ class ConductorCurrents(SurfaceCurrents):
         both = np.concatenate([self.incident_electric, self._incident])
         return np.asarray(np.multiply.outer(np.exp(1j * self.wavenumber * (points @ self.direction)), both))
 
-    def _changed(self, radiated: Callable[..., ComplexArray], points: FloatArray) -> FloatArray:
+    def _changed(self, points: FloatArray, *, electric: bool) -> FloatArray:
         """What the second order of the lit nodes and of the others adds, apart, in the root of squares (m, p)."""
         J = self.change * self.weights[:, None, None]
-        each = [radiated(self.points[part], J[part], points, self.wavenumber) for part in (self.lit, ~self.lit)]
+        given = points, self.wavenumber
+        each = [field_of_vector(self.points[on], J[on], *given, electric=electric) for on in (self.lit, ~self.lit)]
         return np.asarray(np.sqrt(np.sum(np.abs(each) ** 2, axis=(0, 2))))
 
     @cached_property
@@ -138,10 +133,12 @@ class ConductorCurrents(SurfaceCurrents):
         return np.asarray(np.einsum("moc,mci->moi", spherical_frame(directions), f))
 
     def _field(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
-        return magnetic_field_of_vector(self.points, values * self.weights[:, None, None], points, self.wavenumber)
+        J = values * self.weights[:, None, None]
+        return field_of_vector(self.points, J, points, self.wavenumber, electric=False)
 
     def _electric(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
-        return electric_field_of_vector(self.points, values * self.weights[:, None, None], points, self.wavenumber)
+        J = values * self.weights[:, None, None]
+        return field_of_vector(self.points, J, points, self.wavenumber, electric=True)
 
     @cached_property
     def _amplitude(self) -> FloatArray:
@@ -167,7 +164,7 @@ def lit_vectors(
     lit: LitNodes, direction: FloatArray, electric: ComplexArray, wavenumber: float, order: int
 ) -> ComplexArray:
     """J of the lit side's expansion at its nodes, for incident E0 (3, p): (n, 3, p)."""
-    bright = lit_conductor(lit.cosine, lit.along, lit.across, lit.twist, lit.rate, lit.bend, wavenumber, order)
+    bright = lit_conductor(lit.ground, wavenumber, order)
     bright = bright * np.exp(1j * wavenumber * (lit.points @ direction))[:, None, None]
     h, e = amplitudes(lit.normals, lit.axes, direction, electric)
     b = np.cross(lit.normals, lit.axes)

@@ -52,7 +52,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from creeping._typing import ComplexArray, FloatArray
+from creeping._typing import BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import ELECTRIC_HARD, ELECTRIC_SOFT, Boundary, fock_scale
 from creeping.field.fock import surface_function, surface_slope
 from creeping.field.waves.reflected import plane_reflection
@@ -68,20 +68,10 @@ STEEPEST = 20.0
 """Bound of |kappa_b/kappa_a| in the second order."""
 
 
-def lit_currents(
-    cosine: FloatArray,
-    along: FloatArray,
-    across: FloatArray,
-    twist: FloatArray,
-    rate: FloatArray,
-    bend: FloatArray,
-    wavenumber: float,
-    boundary: Boundary,
-    order: int = 2,
-) -> ComplexArray:
-    """Field u of the boundary, or du/dn (1/L) where u = 0, over e^{ikd.x}, at points of the lit side (n,).
+class Ground(NamedTuple):
+    """What currents of the lit side depend on at points (n,).
 
-    Parameters
+    Attributes
     ----------
     cosine : (n,)
         C = -n.d, to a little below 0.
@@ -89,6 +79,26 @@ def lit_currents(
         Normal curvatures kappa_a and kappa_b, and the entry t of the shape operator between both directions.
     rate, bend : (n,)
         rho' and rho rho'', without unit; read where kappa_a > 0.
+    """
+
+    cosine: FloatArray
+    along: FloatArray
+    across: FloatArray
+    twist: FloatArray
+    rate: FloatArray
+    bend: FloatArray
+
+    def part(self, at: BoolArray | IntArray) -> "Ground":
+        """Some of the points."""
+        return Ground(*(values[at] for values in self))
+
+
+def lit_currents(ground: Ground, wavenumber: float, boundary: Boundary, order: int = 2) -> ComplexArray:
+    """Field u of the boundary, or du/dn (1/L) where u = 0, over e^{ikd.x}, at points of the lit side (n,).
+
+    Parameters
+    ----------
+    ground : Ground
     wavenumber : float, 1/L
     boundary : Boundary
     order : 2 or 1
@@ -96,26 +106,18 @@ def lit_currents(
     Examples
     --------
     >>> from creeping.field.boundary import HARD
-    >>> lit_currents(np.array([1.0]), *np.zeros((5, 1)), 10.0, HARD)             # twice the wave on a plane
+    >>> lit_currents(Ground(np.array([1.0]), *np.zeros((5, 1))), 10.0, HARD)     # twice the wave on a plane
     array([2.+0.j])
     """
-    m = fock_scale(wavenumber, along)
-    xi = -m * cosine
-    curved = (along > 0) & (xi > -OPTICS[1])
-    out = np.empty(cosine.shape, dtype=complex)
-    flat = ~curved
-    out[flat] = _optics(cosine[flat], along[flat], across[flat], wavenumber, boundary.part(flat), order)
-    at = np.flatnonzero(curved)
-    local = _Local(*(v[at] for v in (cosine, along, across, twist, rate, bend, m, xi)))
-    out[at] = _near_grazing(local, wavenumber, boundary.part(at), order)
+    curved = (ground.along > 0) & (-fock_scale(wavenumber, ground.along) * ground.cosine > -OPTICS[1])
+    out = np.empty(ground.cosine.shape, dtype=complex)
+    for some, currents in ((~curved, _optics), (curved, _near_grazing)):
+        out[some] = currents(ground.part(some), wavenumber, boundary.part(some), order)
     return out
 
 
-def _optics(
-    cosine: FloatArray, along: FloatArray, across: FloatArray, wavenumber: float, boundary: Boundary, order: int
-) -> ComplexArray:
-    c = np.maximum(cosine, 1e-9)
-    k = wavenumber
+def _optics(ground: Ground, k: float, boundary: Boundary, order: int) -> ComplexArray:
+    along, across, c = ground.along, ground.across, np.maximum(ground.cosine, 1e-9)
     if boundary.kind.endswith("soft"):
         second = np.asarray(1j * (along / c**2 + boundary.sign * across) / (2 * k * c), dtype=complex)
         return np.asarray(-2j * k * c * (1 + (order == 2) * limited(second, BOUND)))
@@ -126,41 +128,29 @@ def _optics(
     return np.asarray(2 * c / (c + eta) * (1 + (order == 2) * limited(second, BOUND)))
 
 
-class _Local(NamedTuple):
-    """What the current near grazing depends on, each (n,)."""
-
-    cosine: FloatArray
-    along: FloatArray
-    across: FloatArray
-    twist: FloatArray
-    rate: FloatArray
-    bend: FloatArray
-    m: FloatArray
-    xi: FloatArray
-
-
-def _near_grazing(at: _Local, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
+def _near_grazing(at: Ground, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
     """Fock's current, of second order at grazing, passing into optics: (n,)."""
-    m, xi = at.m, at.xi
+    m = fock_scale(wavenumber, at.along)
+    xi = -m * at.cosine
     q = boundary.q(m)
     scale = (wavenumber / m) * np.exp(1j * xi**3 / 3) if q is None else np.exp(1j * xi**3 / 3)
     g = surface_function(xi, q)
     out = g
     if order == 2:
-        change = _corrections(at, q, g, boundary)
-        out = g + limited(change, BOUND * np.abs(g))
+        out = g + limited(_corrections(at, m, xi, q, g, boundary), BOUND * np.abs(g))
     out = out * scale
     far = smoothstep(-xi, *OPTICS)
     beyond = far > 0
-    ray = _optics(at.cosine[beyond], at.along[beyond], at.across[beyond], wavenumber, boundary.part(beyond), order)
+    ray = _optics(at.part(beyond), wavenumber, boundary.part(beyond), order)
     out[beyond] = (1 - far[beyond]) * out[beyond] + far[beyond] * ray
     return np.asarray(out)
 
 
-def _corrections(at: _Local, q: ComplexArray | float | None, g: ComplexArray, boundary: Boundary) -> ComplexArray:
+def _corrections(
+    at: Ground, m: FloatArray, xi: FloatArray, q: ComplexArray | float | None, g: ComplexArray, boundary: Boundary
+) -> ComplexArray:
     """(rho'/m) E + D/m^2 (n,)."""
-    xi, rate, bend = at.xi, at.rate, at.bend
-    m = np.maximum(at.m, LEAST_SCALE)
+    rate, bend, m = at.rate, at.bend, np.maximum(m, LEAST_SCALE)
     r = np.clip(at.across / at.along, -STEEPEST, STEEPEST)
     T = np.minimum((at.twist / at.along) ** 2, STEEPEST)
     soft, constant = q is None, not isinstance(q, np.ndarray)
@@ -199,46 +189,30 @@ def _corrections(at: _Local, q: ComplexArray | float | None, g: ComplexArray, bo
             curved = curved - 2 / 15 * q * surface_slope(xi, q, 1)
     change = np.asarray(rate / m * varying + curved / m**2)
     if q is not None and np.any(boundary.drift):
-        change = change + _memory(at, np.asarray(q), g, boundary)
-    return change
+        # G, differenced over a thousandth of q to either side
+        pairs = [[surface_slope(xi, q * (1 + step), n) for step in (1e-3, -1e-3)] for n in (0, 1)]
+        bent, turned = ((ahead - behind) / (2e-3 * q) for ahead, behind in pairs)
+        change = change + boundary.drift / at.along * (g + 2 * q * slope + (q**2 * bent - turned) / 2)
+    return np.asarray(change)
 
 
-def _memory(at: _Local, q: ComplexArray, g: ComplexArray, boundary: Boundary) -> ComplexArray:
-    """G (n,)."""
-    slope = surface_slope(at.xi, q)
-    # differenced over a thousandth of q to either side
-    pairs = [[surface_slope(at.xi, q * (1 + step), n) for step in (1e-3, -1e-3)] for n in (0, 1)]
-    bend, turned = ((ahead - behind) / (2e-3 * q) for ahead, behind in pairs)
-    return np.asarray(boundary.drift / at.along * (g + 2 * q * slope + (q**2 * bend - turned) / 2))
-
-
-def lit_conductor(
-    cosine: FloatArray,
-    along: FloatArray,
-    across: FloatArray,
-    twist: FloatArray,
-    rate: FloatArray,
-    bend: FloatArray,
-    wavenumber: float,
-    order: int = 2,
-) -> ComplexArray:
+def lit_conductor(ground: Ground, wavenumber: float, order: int = 2) -> ComplexArray:
     """Components J_a, J_b (rows) for unit amplitudes h, e (columns), over e^{ikd.x}, at points (n,): (n, 2, 2).
 
     Parameters
     ----------
-    cosine, along, across, twist, rate, bend, wavenumber, order
+    ground, wavenumber, order
         As of `creeping.field.currents.lit.lit_currents`.
 
     Examples
     --------
-    >>> lit_conductor(np.array([1.0]), *np.zeros((5, 1)), 10.0)[0].round(12).tolist()    # 2 n x H on a plane
+    >>> lit_conductor(Ground(np.array([1.0]), *np.zeros((5, 1))), 10.0)[0].round(12).tolist()    # 2 n x H on a plane
     [[(-2-0j), 0j], [0j, (2+0j)]]
     """
+    cosine, along, twist = ground.cosine, ground.along, ground.twist
     out = np.zeros((len(cosine), 2, 2), dtype=complex)
-    out[:, 0, 0] = -lit_currents(cosine, along, across, twist, rate, bend, wavenumber, ELECTRIC_HARD, order)
-    out[:, 1, 1] = (
-        1j / wavenumber * lit_currents(cosine, along, across, twist, rate, bend, wavenumber, ELECTRIC_SOFT, order)
-    )
+    out[:, 0, 0] = -lit_currents(ground, wavenumber, ELECTRIC_HARD, order)
+    out[:, 1, 1] = 1j / wavenumber * lit_currents(ground, wavenumber, ELECTRIC_SOFT, order)
     if order == 2:
         m = fock_scale(wavenumber, along)
         xi = -m * cosine

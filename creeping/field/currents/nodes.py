@@ -24,7 +24,7 @@ import numpy as np
 from creeping._typing import BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.boundary import Boundary, fock_scale, slowest_decay
-from creeping.field.currents.lit import lit_currents
+from creeping.field.currents.lit import Ground, lit_currents
 from creeping.field.marching.fan_waves import fan_waves, march_alone, marchable, spread_out
 from creeping.field.waves.shed_wave import smoothstep
 from creeping.field.waves.surface import surface_waves
@@ -38,7 +38,7 @@ from creeping.rays.reach import ray_length
 from creeping.rays.strips import ray_points
 from creeping.shadow.attachment import occluded
 from creeping.shadow.line import ShadowLine
-from creeping.shadow.status import ATTACHED
+from creeping.shadow.status import PointState
 
 PENUMBRA = (0.0, 0.6)
 """xi over which the rays take over from the lit side's nodes."""
@@ -81,6 +81,11 @@ class LitNodes:
     bend: FloatArray
     axes: FloatArray
     twist: FloatArray
+
+    @property
+    def ground(self) -> Ground:
+        """What the currents depend on."""
+        return Ground(self.cosine, self.along, self.across, self.twist, self.rate, self.bend)
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +176,7 @@ def _out_of_the_wave(line: ShadowLine, points: FloatArray, dark: BoolArray) -> B
     # a point of the penumbra has the state of the line next to it
     on_line = np.concatenate([curve.points for curve in line.curves])
     state = np.concatenate([curve.state_at(curve.arclength) for curve in line.curves])
-    out[dark] = state[cKDTree(on_line).query(points[dark])[1]] != ATTACHED
+    out[dark] = state[cKDTree(on_line).query(points[dark])[1]] != PointState.ATTACHED
     return out
 
 
@@ -205,7 +210,12 @@ def radius_rates(
 
 def ray_nodes(fan: RayFan, wavenumber: float, boundary: Boundary) -> RayNodes:
     """Nodes along the creeping rays of a fan's incidence, as long and as dense as the wavenumber, 1/L, asks for."""
-    length = _length(fan, wavenumber, boundary)
+    typical = fan.curvature[:, 0]
+    # a boundary's own mode may be slower than the hard one's, by which rays are long by default
+    m = fock_scale(wavenumber, np.median(typical, keepdims=True) if len(typical) else np.ones(1))
+    slowest = slowest_decay(boundary, m, fan.points[:, 0]) if np.all(np.isfinite(m)) else 0.0
+    # a mode that decays less ends with the longest rays
+    length = ray_length(fan.line, wavenumber=wavenumber, decay=max(slowest, 1e-3))
     wavelength = 2 * np.pi / wavenumber
     attached = sum(curve.length for curve in fan.line.curves) * fan.line.fractions["attached"]
     # marches ask for some rays on each arc, and arcs of bodies of pieces are many and short
@@ -231,16 +241,6 @@ def ray_nodes(fan: RayFan, wavenumber: float, boundary: Boundary) -> RayNodes:
     return RayNodes(dense, np.nonzero(there)[0], rays, normals, weights, twist)
 
 
-def _length(fan: RayFan, wavenumber: float, boundary: Boundary) -> float:
-    """Length, L, at which the slowest mode of the boundary has died away."""
-    typical = fan.curvature[:, 0]
-    # a boundary's own mode may be slower than the hard one's, by which rays are long by default
-    m = fock_scale(wavenumber, np.median(typical, keepdims=True) if len(typical) else np.ones(1))
-    slowest = slowest_decay(boundary, m, fan.points[:, 0]) if np.all(np.isfinite(m)) else 0.0
-    # a mode that decays less ends with the longest rays
-    return ray_length(fan.line, wavenumber=wavenumber, decay=max(slowest, 1e-3))
-
-
 def _share_of_rays(
     body: Surface, rays: RayPoints, normals: FloatArray, direction: FloatArray, wavenumber: float
 ) -> FloatArray:
@@ -262,9 +262,8 @@ def lit_waves(
     """Wave at nodes of the lit side of a body of size ``extent``, L, by second and by first order (n,)."""
     along = direction + part.cosine[:, None] * part.normals
     here = kind.at(part.points, along, STEP * extent)
-    geometry = part.cosine, part.along, part.across, part.twist, part.rate, part.bend
     wave = np.exp(1j * k * (part.points @ direction))
-    second, first = (wave * lit_currents(*geometry, k, here, order) for order in (2, 1))
+    second, first = (wave * lit_currents(part.ground, k, here, order) for order in (2, 1))
     return second, first
 
 

@@ -26,8 +26,6 @@ ground in the dark receives. An impedance has no bounce: where it was tried, eta
 Sources: [CK13, sec. 2.2 and 6.2], [BMK19]; Derivations, F16, F17 and F29.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -145,37 +143,22 @@ def far_of_vector(
     return np.asarray(1j * wavenumber / (4 * np.pi) * (sums - np.einsum("m...,mc->mc...", along, directions)))
 
 
-def magnetic_field_of_vector(
-    points: FloatArray, currents: ComplexArray, at: FloatArray, wavenumber: float
+def field_of_vector(
+    points: FloatArray, currents: ComplexArray, at: FloatArray, wavenumber: float, *, electric: bool
 ) -> ComplexArray:
-    """Scattered H (m, 3, ...) at points off the body, in the unit of the incident one, of J dS (n, 3, ...)."""
-    from creeping.field.kernels.near_pairs import curl
+    """Scattered E, or H in the unit of the incident one, (m, 3, ...) at points off the body, of J dS (n, 3, ...)."""
+    from creeping.field.kernels import near_pairs
 
-    return _vector_sums(curl, points, currents, at, wavenumber)
-
-
-def electric_field_of_vector(
-    points: FloatArray, currents: ComplexArray, at: FloatArray, wavenumber: float
-) -> ComplexArray:
-    """Scattered E (m, 3, ...) at points off the body, in the unit of the incident one, of J dS (n, 3, ...)."""
-    from creeping.field.kernels.near_pairs import electric
-
-    return _vector_sums(electric, points, currents, at, wavenumber)
-
-
-def _vector_sums(
-    kernel: Callable[..., None], points: FloatArray, currents: ComplexArray, at: FloatArray, wavenumber: float
-) -> ComplexArray:
-    """A kernel's vectors (m, 3, ...) at points of J dS (n, 3, ...)."""
     if currents.ndim > 2:
         each = np.moveaxis(currents.reshape(*currents.shape[:2], -1), -1, 0)
-        fields = [_vector_sums(kernel, points, one, at, wavenumber) for one in each]
+        fields = [field_of_vector(points, one, at, wavenumber, electric=electric) for one in each]
         return np.stack(fields, axis=-1).reshape(len(at), 3, *currents.shape[2:])
     J = currents.T / (4 * np.pi)
     real, imaginary = np.ascontiguousarray(J.real), np.ascontiguousarray(J.imag)
     out = np.empty((len(at), 6))
     columns, at = np.ascontiguousarray(points.T), np.ascontiguousarray(at)
     given = columns, real, imaginary, wavenumber
+    kernel = near_pairs.electric if electric else near_pairs.curl
     in_threads(lambda part: kernel(*given, at[part], out[part]), len(at), least=32, multiple=8)
     return np.asarray(out[:, :3] + 1j * out[:, 3:])
 

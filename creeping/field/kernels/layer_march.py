@@ -173,29 +173,15 @@ def back_substitute(nd, f, weight, total):
 
 
 @njit(**options)
-def into_step(w, step, levels, scale):
-    """Replace nodal values and slopes of y by those of w = y/sqrt(h), h = 1 + c m; rates are m'."""
+def turned(w, step, levels, scale, sense):
+    """Replace nodal values and slopes of w by those of w h^(sense/2), h = 1 + c m, sense 1 or -1; rates are m'."""
     c, e = load(step[0], 0), load(step[1], 0)
-    one, half = spread(1.0), spread(0.5 * scale)
-    for j in range(levels.shape[1]):
-        h = one + c * spread(levels[0, j]) + e * spread(levels[2, j])
-        f = one / root(h)
-        slope = half * (c * spread(levels[1, j]) + e * spread(levels[3, j])) / h
-        at = 2 * j * ROW
-        for part in range(0, ROW, LANES):
-            u = load(w, at + part)
-            store(w, at + part, f * u)
-            store(w, at + ROW + part, f * (load(w, at + ROW + part) - slope * u))
-
-
-@njit(**options)
-def out_of_step(w, step, levels, scale):
-    """Undo `into_step`."""
-    c, e = load(step[0], 0), load(step[1], 0)
-    one, half = spread(1.0), spread(0.5 * scale)
+    one, half = spread(1.0), spread(0.5 * scale * sense)
     for j in range(levels.shape[1]):
         h = one + c * spread(levels[0, j]) + e * spread(levels[2, j])
         f = root(h)
+        if sense < 0.0:
+            f = one / f
         slope = half * (c * spread(levels[1, j]) + e * spread(levels[3, j])) / h
         at = 2 * j * ROW
         for part in range(0, ROW, LANES):
@@ -244,7 +230,7 @@ def march_block(mats, levels, cut, scale, k, soft, steps, poles, weights, g, bet
         for lane in range(LANES):
             if switch[lane] == step:
                 switch_to_total(w, incident, cut, lane)
-        into_step(w, steps[step], levels, scale)
+        turned(w, steps[step], levels, scale, -1.0)
         if not soft:
             meet_condition(w, beta[step], g[step, poles.shape[1]], scale)
         operator(mats, steps[step], K)
@@ -253,6 +239,6 @@ def march_block(mats, levels, cut, scale, k, soft, steps, poles, weights, g, bet
         for j in range(poles.shape[1]):
             factorise(mats, K, rhs, poles[step, j], soft, g[step, j], beta[step], per, f)
             back_substitute(nd, f, weights[step, j], w)
-        out_of_step(w, steps[step], levels, scale)
+        turned(w, steps[step], levels, scale, 1.0)
         for i in range(ROW):
             out[step + 1, 0, i], out[step + 1, 1, i] = w[i], w[ROW + i] / scale

@@ -54,37 +54,15 @@ ROUNDS = 4
 
 
 @njit(**strict_options)
-def load_steps(
-    k,
-    soft,
-    lane,
-    s,
-    kappa,
-    across,
-    spreading,
-    torsion,
-    lean,
-    potential,
-    eta,
-    phase,
-    climb,
-    edges,
-    driven,
-    b,
-    c,
-    steps,
-    poles,
-    weights,
-    g,
-    beta,
-    lit,
-):
+def load_steps(k, soft, lane, s, cubics, eta, edges, driven, b, c, steps, poles, weights, g, beta, lit):
     """Fill a lane of a block with a ray's steps, the last of them repeated to the block's end.
 
-    kappa to climb are cubics between the nodes s; b and c (n, p) are those of its n steps between ``edges``.
+    ``cubics`` between the nodes s are those of what is named below; b and c (n, p) are those of its n steps between
+    ``edges``.
     steps (steps, 4, LANES) gets kappa_n, e, c0 and a; lit (driven + 1, 4) gets q = d.n, d.x - s, kappa_a and J at the
     edges of driven steps. Returns the largest misfit of the traces.
     """
+    kappa, across, spreading, torsion, lean, potential, phase, climb = cubics
     n = len(edges) - 1
     p = b.shape[1]
     mid, aside = np.empty((n, 4)), np.empty(n)
@@ -121,32 +99,14 @@ def load_steps(
 
 
 @njit(**strict_options)
-def load_waves(
-    k,
-    soft,
-    lane,
-    s,
-    bend,
-    curve,
-    across,
-    lean,
-    eta,
-    start,
-    stop,
-    lit,
-    nodes,
-    levels,
-    fade,
-    scale,
-    wave,
-    incident,
-):
+def load_waves(k, soft, lane, s, bend, curve, across, lean, eta, start, stop, lit, grid, wave, incident):
     """Fill a lane with the reflected wave at the start and the incident one at the end of the driven steps.
 
     bend and curve are those of the profile's plane curve; levels (4, nodes) hold m and m' in the first two rows; fade
     (nodes, 2) is what the reflected wave is multiplied with, and its slope; wave and incident (2 nodes, 2 LANES) get
     values and slopes, slopes times ``scale``.
     """
+    nodes, levels, fade, scale = grid
     u = np.empty((len(nodes), 2), np.complex128)
     i = interval(s, start)
     t = start - s[i]

@@ -202,7 +202,9 @@ class JointedRays(NamedTuple):
 def jointed_rays(body: Any, states: FloatArray, times: FloatArray, *, rtol: float) -> JointedRays:
     """Trace states (rays, 10) through a lattice of times (k,), L, from 0 on."""
     trace = trace_pieces(body, states, times, rtol=rtol)
-    found = [_ray(body, times, trace.states[ray], *_passed(trace, ray), rtol) for ray in range(len(states))]
+    joints = [trace.passages.travel_time[trace.passages.ray == ray] for ray in range(len(states))]
+    each = zip(trace.states, joints, trace.end.tolist(), strict=True)
+    found = [_ray(body, times, *one, rtol) for one in each]
     count = max(sum(stretch.nodes for stretch in ray) for ray in found)
     own, lanes, on = np.empty((len(found), count)), np.zeros((len(found), count, WITH_JACOBI)), []
     for row, ray in enumerate(found):
@@ -252,12 +254,6 @@ class _Stretch(NamedTuple):
         out[:, P] /= np.linalg.norm(out[:, P], axis=1, keepdims=True)
         out[:, M11], out[:, M21] = tube(self.at), tube(self.at, 1)
         return out
-
-
-def _passed(trace: Any, ray: int) -> tuple[FloatArray, float]:
-    """Times at which a ray crosses joints, and its end."""
-    mine = trace.passages.ray == ray
-    return trace.passages.travel_time[mine], float(trace.end[ray])
 
 
 def _ray(

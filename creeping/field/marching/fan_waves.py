@@ -77,24 +77,19 @@ class StripTable:
         """Splines of the real and the imaginary part on each strip."""
         found = []
         for strip, table in zip(self.strips, self.values, strict=True):
-            places, values = around(strip, table)
+            places, values = strip.positions, table
+            if strip.closed:
+                # six rays more at either end
+                beyond = min(6, len(places))
+                rows = np.arange(-beyond, len(places) + beyond)
+                values = table[rows % len(places)]
+                places = places[rows % len(places)] + strip.period * (rows // len(places))
             degree = min(3, len(places) - 1)
             real, imaginary = (
                 RectBivariateSpline(places, self.times, part, kx=degree) for part in (values.real, values.imag)
             )
             found.append((real, imaginary))
         return found
-
-
-def around(strip: Strip, values: Any) -> tuple[FloatArray, Any]:
-    """Places of a strip's rays and values (rays, ...) there, with some beyond either end of a closed one."""
-    places = strip.positions
-    if not strip.closed:
-        return places, values
-    count = len(places)
-    # six rays more at either end
-    turns = np.arange(-min(6, count), count + min(6, count))
-    return places[turns % count] + strip.period * (turns // count), values[turns % count]
 
 
 def without_tubes(rays: RayPoints) -> RayPoints:
@@ -233,17 +228,13 @@ class FanWaves:
 
     def lean(self, strip: int, sigma: FloatArray, s: FloatArray) -> FloatArray:
         """Lambda at places (n,) of a strip: (n,)."""
-        return np.asarray(self._leans[strip].ev(self.strips[strip].wrap(sigma), s))
+        return self._leans.at(strip, sigma, s).real
 
     @cached_property
-    def _leans(self) -> list[RectBivariateSpline]:
-        """Splines of Lambda on each strip."""
-        profiles, found = self.marched.profiles, []
-        for strip, rows in zip(self.strips, self.rows, strict=True):
-            values = np.stack([profiles.value_of("lean", ray, self.times) for ray in rows])
-            places, values = around(strip, values)
-            found.append(RectBivariateSpline(places, self.times, values, kx=min(3, len(places) - 1)))
-        return found
+    def _leans(self) -> StripTable:
+        value_of = self.marched.profiles.value_of
+        each = [np.stack([value_of("lean", ray, self.times) for ray in rows]) for rows in self.rows]
+        return StripTable(self.strips, self.times, [values.astype(complex) for values in each])
 
 
 def spread_out(y: ComplexArray, rays: RayPoints, wavenumber: float) -> ComplexArray:

@@ -51,9 +51,6 @@ from creeping.field.marching.plan import MarchPlan, MarchStatus, march_plan
 from creeping.field.marching.profile import LayerGrid, RayProfiles, layer_grid
 from creeping.kernels.threads import in_threads
 
-STEPPED = ("curvature", "across", "spreading", "torsion", "lean", "potential")
-"""What steps ask of a profile, in the kernel's order."""
-
 ORDER = 4
 """P of the rational steps."""
 PER_OCTAVE = 8
@@ -97,17 +94,6 @@ class MarchedRays:
     misfit: FloatArray
     wavenumber: float
     profiles: RayProfiles
-
-    def __len__(self) -> int:
-        return len(self.s)
-
-    def __repr__(self) -> str:
-        counts = {code.name: int(np.sum(self.status == code)) for code in MarchStatus if np.any(self.status == code)}
-        return (
-            f"MarchedRays: {len(self)} rays, {int(np.sum(self.counts))} places, k = {self.wavenumber:g}\n"
-            f"  status: {counts}\n"
-            f"  largest misfit of a trace: {np.max(self.misfit, initial=0.0):.2g}"
-        )
 
     def at(self, ray: int, s: ArrayLike) -> ComplexArray:
         """Values (m,) of a ray at places (m,), L; 0 where it was not marched.
@@ -186,8 +172,9 @@ class _March:
         self.misfit = np.zeros(len(ends))
         self.status = plan.status.copy()
         self.reliable = plan.reliable.copy()
-        shares = [profiles.obliqueness(ray, 0.5 * (edges[1:] + edges[:-1])) for ray, edges in enumerate(self.edges)]
-        ways = [share * np.diff(edges) for share, edges in zip(shares, self.edges, strict=True)]
+        middles = [0.5 * (edges[1:] + edges[:-1]) for edges in self.edges]
+        leans = [profiles.value_of("lean", ray, at) for ray, at in enumerate(middles)]
+        ways = [np.diff(edges) / (1 + lean**2) for edges, lean in zip(self.edges, leans, strict=True)]
         # a joint may stand next to the end of a step
         sizes = np.maximum(np.round(k * np.concatenate(ways), 9), 1e-9)
         distinct, which = np.unique(sizes, return_inverse=True)
@@ -204,13 +191,15 @@ class _March:
         order = sorted(live, key=lambda ray: (hash(self.plan.specs[ray]), counts[ray]))
         blocks: list[list[int]] = []
         for ray in order:
-            fits = blocks and len(blocks[-1]) < LANES and self.plan.specs[blocks[-1][0]] == self.plan.specs[ray]
-            if fits:
-                blocks[-1].append(ray)
-            else:
-                blocks.append([ray])
-        if blocks:
-            in_threads(lambda part: self._march_blocks(blocks[part]), len(blocks), least=2, multiple=1, first=1)
+            if not blocks or len(blocks[-1]) == LANES or self.plan.specs[blocks[-1][0]] != self.plan.specs[ray]:
+                blocks.append([])
+            blocks[-1].append(ray)
+
+        def work(part: slice) -> None:
+            for block in blocks[part]:
+                self._march_block(block)
+
+        in_threads(work, len(blocks), least=2, multiple=1, first=1)
         return MarchedRays(
             s=self.s,
             values=self.values,
@@ -241,10 +230,6 @@ class _March:
             ways.append(np.concatenate(parts))
         return ways[0], ways[1]
 
-    def _march_blocks(self, blocks: list[list[int]]) -> None:
-        for block in blocks:
-            self._march_block(block)
-
     def _march_block(self, block: list[int]) -> None:
         """March one block of rays and keep what is on the surface."""
         from creeping.field.kernels.layer_march import march_block
@@ -270,19 +255,21 @@ class _March:
 
         profiles, edges, driven = self.profiles, self.edges[ray], int(self.driven[ray])
         s, start = profiles.s[ray], float(edges[0])
-        of = {name: profiles.cubics_of(name, ray) for name in (*STEPPED, "bend", "phase", "climb")}
+        # what steps ask of a profile, in the kernel's order
+        names = "curvature", "across", "spreading", "torsion", "lean", "potential", "phase", "climb"
+        of = {name: profiles.cubics_of(name, ray) for name in names}
         eta = self._admittance(ray)
         lit = np.empty((driven + 1, 4))
         b, c = (part[self.which[ray]] for part in self.rational)
         self.misfit[ray] = load_steps(
-            *(self.k, self.soft, lane, s, *(of[name] for name in STEPPED), eta, of["phase"], of["climb"]),
-            *(edges, driven, b, c, data.steps, data.poles, data.weights, data.drive, data.beta, lit),
+            *(self.k, self.soft, lane, s, tuple(of.values()), eta, edges, driven, b, c),
+            *(data.steps, data.poles, data.weights, data.drive, data.beta, lit),
         )
         data.switch[lane] = driven
+        bend, heights = profiles.cubics_of("bend", ray), (grid.nodes, grid.levels, grid.fade, grid.scale)
         load_waves(
-            *(self.k, self.soft, lane, s, of["bend"], profiles.curves[ray], of["across"], of["lean"], eta),
-            *(start, self.plan.stop[ray], lit),
-            *(grid.nodes, grid.levels, grid.fade, grid.scale, data.wave, data.incident),
+            *(self.k, self.soft, lane, s, bend, profiles.curves[ray], of["across"], of["lean"], eta),
+            *(start, self.plan.stop[ray], lit, heights, data.wave, data.incident),
         )
         y = np.sqrt(lit[:, 3]) * np.exp(1j * self.k * lit[:, 1])
         # the total is the scattered wave and this, or its slope

@@ -113,7 +113,7 @@ def march_plan(profiles: RayProfiles, wavenumber: float) -> MarchPlan:
     first, twist = _rounded(0.2 * delta_most, k, 1.35, np.floor), _rounded(8 * delta, k, 1.35, np.floor)
     cap = _rounded(CAP / np.maximum(-lowest, 1e-6 * most), k, 1.04, np.round)
     cap = np.where(lowest < -1e-6 * most, cap, np.inf)
-    status, reliable = _status(k, at, look, start, alpha, cap, served)
+    status, reliable = _status(k, at, look, alpha, cap, served)
     rows = np.stack([height, element, first, cap, twist], axis=1).tolist()
     specs = [GridSpec(a, b, c, d, e, k) for a, b, c, d, e in rows]
     return MarchPlan(start, stop, switch, steps, specs, status, reliable)
@@ -145,13 +145,7 @@ def _starts(at: FloatArray, kappa: FloatArray, psi: FloatArray) -> tuple[FloatAr
 
 
 def _status(
-    k: float,
-    at: FloatArray,
-    look: FloatArray,
-    start: FloatArray,
-    alpha: FloatArray,
-    cap: FloatArray,
-    served: BoolArray,
+    k: float, at: FloatArray, look: FloatArray, alpha: FloatArray, cap: FloatArray, served: BoolArray
 ) -> tuple[IntArray, FloatArray]:
     """Status and place up to which the wave is reliable (rays,)."""
     kappa = look[..., 0]

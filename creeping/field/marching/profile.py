@@ -31,7 +31,7 @@ matrix.
 Sources: Derivations, F22; [C93].
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -39,7 +39,6 @@ import numpy as np
 from creeping._typing import Any, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError
 
-GIVEN = ("curvature", "transverse", "spreading", "admittance", "torsion", "lean", "potential", "phase", "climb")
 LEAST_NODES = 4
 """Nodes of a piece between two jumps: curvatures are cubics between nodes."""
 
@@ -51,77 +50,54 @@ KEPT_BELOW, CAP = 0.6, 0.85
 
 @dataclass(frozen=True, eq=False)
 class RayProfiles:
-    """Rays of a fan, or the two senses of a plane section, from the lit side on.
+    """Rays from the lit side on.
 
     Parameters
     ----------
     s : (rays, m), L
         Arc length on each ray's own nodes, ascending; 0, at the shadow line where p = d, is one of them. A node that
-        stands twice parts two pieces: there curvatures and admittance may jump.
+        stands twice parts two pieces, of 4 nodes or more: there curvatures and admittance may jump.
     curvature : (rays, m), 1/L
         kappa_n of the body along the ray, positive where convex.
-    transverse : (rays, m), 1/L, optional
-        kappa_t across the ray; 0 on a plane section, as all that follow but J, which is 1.
-    spreading : (rays, m), optional
+    transverse : (rays, m), 1/L
+        kappa_t across the ray.
+    spreading : (rays, m)
         J, 1 at s = 0.
-    admittance : (rays, m) complex, optional
-        eta along the ray, for an impedance; 0 if there is none.
-    torsion : (rays, m), 1/L, optional
+    torsion : (rays, m), 1/L
         tau.
-    lean : (rays, m), optional
+    lean : (rays, m)
         Lambda.
-    potential : (rays, m), 1/L^2, optional
+    potential : (rays, m), 1/L^2
         V.
-    phase : (rays, m), L, optional
-        d.(x - x0) - s; that of the plane curve if not given.
-    climb : (rays, m), optional
-        d.n, likewise.
+    phase : (rays, m), L
+        d.(x - x0) - s.
+    climb : (rays, m)
+        d.n.
+    admittance : (rays, m) complex, optional
+        eta along the ray, where it varies.
 
     Raises
     ------
     InvalidInputError
-        If shapes differ, values are not finite, or nodes do not ascend, lack 0, or are fewer than 4 on a piece.
+        If values are not finite.
     """
 
     s: FloatArray
     curvature: FloatArray
-    transverse: FloatArray | None = None
-    spreading: FloatArray | None = None
+    transverse: FloatArray
+    spreading: FloatArray
+    torsion: FloatArray
+    lean: FloatArray
+    potential: FloatArray
+    phase: FloatArray
+    climb: FloatArray
     admittance: ComplexArray | None = None
-    torsion: FloatArray | None = None
-    lean: FloatArray | None = None
-    potential: FloatArray | None = None
-    phase: FloatArray | None = None
-    climb: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        shape = np.shape(self.s)
-        if len(shape) != 2 or shape[1] < LEAST_NODES:
-            raise InvalidInputError(f"s has the shape {shape}; give (rays, m) with m >= {LEAST_NODES}")
-        for name in ("s", *GIVEN):
-            given: Any = getattr(self, name)
-            if given is None:
-                continue
-            values = np.ascontiguousarray(given, dtype=complex if name == "admittance" else float)
-            if values.shape != shape:
-                raise InvalidInputError(f"{name} has the shape {values.shape}, s has {shape}")
-            if not np.all(np.isfinite(values)):
-                rays = np.sum(~np.all(np.isfinite(values), axis=1))
-                raise InvalidInputError(f"{name} is not finite on {rays} of {shape[0]} rays")
-            object.__setattr__(self, name, values)
-        self._check_nodes()
-
-    def _check_nodes(self) -> None:
-        step = np.diff(self.s, axis=1)
-        if np.any(step < 0):
-            raise InvalidInputError(f"s descends on {np.sum(np.any(step < 0, axis=1))} of {len(step)} rays")
-        if not np.all(np.any(self.s == 0, axis=1)):
-            lacking = np.sum(~np.any(self.s == 0, axis=1))
-            raise InvalidInputError(f"{lacking} of {len(step)} rays have no node at s = 0, on the shadow line")
-        for ray in range(len(self)):
-            ends = np.flatnonzero(np.concatenate([[True], step[ray] == 0, [True]]))
-            if np.min(np.diff(ends)) < LEAST_NODES:
-                raise InvalidInputError(f"ray {ray} has a piece of fewer than {LEAST_NODES} nodes")
+        for name, values in self._known.items():
+            bad = ~np.all(np.isfinite(values), axis=1)
+            if np.any(bad):
+                raise InvalidInputError(f"{name} is not finite on {np.sum(bad)} of {len(bad)} rays")
 
     def __len__(self) -> int:
         return len(self.s)
@@ -129,13 +105,9 @@ class RayProfiles:
     @cached_property
     def _known(self) -> dict[str, Any]:
         """What is given, and what follows from it: the bend of the plane curve and kappa_t - tau Lambda across it."""
-        found = {name: getattr(self, name) for name in GIVEN if getattr(self, name) is not None}
-        found["bend"], found["across"] = self.curvature, found.get("transverse", np.zeros_like(self.s))
-        if self.lean is not None:
-            found["bend"] = self.curvature * np.sqrt(1 + self.lean**2)
-            if self.torsion is not None:
-                found["across"] = found["across"] - self.torsion * self.lean
-        return found
+        found = {one.name: getattr(self, one.name) for one in fields(self) if getattr(self, one.name) is not None}
+        found["bend"] = self.curvature * np.sqrt(1 + self.lean**2)
+        return found | {"across": self.transverse - self.torsion * self.lean}
 
     @cached_property
     def _cubics(self) -> dict[str, Any]:
@@ -143,26 +115,16 @@ class RayProfiles:
         return {}
 
     def cubics_of(self, name: str, ray: int) -> Any:
-        """Cubics (m - 1, 4) of a quantity along a ray; of one that is not given, those of its constant."""
-        if name not in self._cubics:
-            self._cubics[name] = self._make_cubics(name)
-        return self._cubics[name][ray]
-
-    def _make_cubics(self, name: str) -> Any:
+        """Cubics (m - 1, 4) of a quantity along a ray."""
         from creeping.field.kernels.ray_profile import cubics
 
-        if name in self._known:
+        if name not in self._cubics:
             values = self._known[name]
-        elif name == "phase":
-            values = self.curves[..., 1] - self.s
-        elif name == "climb":
-            values = np.sin(self.curves[..., 0])
-        else:
-            values = np.full(self.s.shape, 1.0 if name == "spreading" else 0.0)
-        out = np.empty((*values[:, 1:].shape, 4), values.dtype)
-        for ray in range(len(self)):
-            cubics(self.s[ray], values[ray], out[ray])
-        return out
+            out = np.empty((*values[:, 1:].shape, 4), values.dtype)
+            for number in range(len(self)):
+                cubics(self.s[number], values[number], out[number])
+            self._cubics[name] = out
+        return self._cubics[name][ray]
 
     @cached_property
     def curves(self) -> FloatArray:
@@ -191,10 +153,6 @@ class RayProfiles:
         i = np.where((i > 0) & (s[i + 1] <= s[i]), i - 1, i)
         t, c = at - s[i], cubics[i].T
         return c[0] + t * (c[1] + t * (c[2] + t * c[3]))
-
-    def obliqueness(self, ray: int, at: FloatArray) -> FloatArray:
-        """cos^2 = 1/(1 + Lambda^2) of a ray at places (n,)."""
-        return np.asarray(1 / (1 + self.value_of("lean", ray, at) ** 2))
 
     def jumps(self, ray: int) -> FloatArray:
         """Places where the curvature may jump."""

@@ -19,14 +19,6 @@ from creeping.rays.port_rays import PortRays
 if TYPE_CHECKING:
     import xarray
 
-MEANINGS = {
-    "point": "u of a unit source e^{ikr}/(4 pi r)",
-    "slot": "H of a unit magnetic dipole, times the impedance of free space",
-    "monopole": "E of a unit electric dipole, times the admittance of free space",
-    "monopoleslot": "H along slots, times the impedance of free space, and E along n at monopoles, of unit dipoles",
-}
-"""What values are, by the kinds of ports."""
-
 
 @dataclass(frozen=True, eq=False)
 class CouplingPaths:
@@ -196,8 +188,14 @@ class Coupling(ArrayResult, WithStatus, Drawn, Tabled):
     @property
     def _kind(self) -> tuple[str, str]:
         """Unit of the values, and what they are."""
-        kinds = sorted(set(self.kinds.tolist()))
-        return power(self.length_unit, -1 if kinds == ["point"] else -2), MEANINGS["".join(kinds)]
+        meanings = {
+            "point": "u of a unit source e^{ikr}/(4 pi r)",
+            "slot": "H of a unit magnetic dipole, times the impedance of free space",
+            "monopole": "E of a unit electric dipole, times the admittance of free space",
+            "monopoleslot": "H along slots, times the impedance of free space, E along n at monopoles, of unit dipoles",
+        }
+        kinds = "".join(sorted(set(self.kinds.tolist())))
+        return power(self.length_unit, -1 if kinds == "point" else -2), meanings[kinds]
 
     def to_xarray(self) -> xarray.Dataset:
         """``xarray.Dataset`` of values, error, status and method, by source and receiver."""

@@ -12,7 +12,7 @@ Sources: [PW81], [P82]; Derivations, F25, F28, F33 and F34.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, overload
+from typing import Literal, TypedDict, Unpack, overload
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from creeping.field.boundary import BoundaryLike, boundary_name, scalar_boundari
 from creeping.field.ports.coupling_result import Coupling
 from creeping.field.ports.sums import port_sums
 from creeping.field.ports.tensor import TENSORS, path_waves
-from creeping.field.results.point_result import FieldStatus
+from creeping.field.results.point_result import FieldStatus, Words
 from creeping.geodesics.equations import points_of_charts
 from creeping.geodesics.states import as_points, on_body
 from creeping.geometry.arguments import checked_body, positive_number, real_array
@@ -40,25 +40,20 @@ Length = float | Literal["auto"]
 Wavenumbers = Sequence[float] | FloatArray
 
 
+class _More(TypedDict, total=False):
+    order: int
+    length: Length
+
+
+class _Bounded(_More, total=False):
+    boundary: BoundaryLike
+
+
+@overload
+def coupling(body: Surface, ports: ArrayLike, *, wavenumber: float, **more: Unpack[_Bounded]) -> Coupling: ...
 @overload
 def coupling(
-    body: Surface,
-    ports: ArrayLike,
-    *,
-    wavenumber: float,
-    boundary: BoundaryLike = ...,
-    order: int = ...,
-    length: Length = ...,
-) -> Coupling: ...
-@overload
-def coupling(
-    body: Surface,
-    ports: ArrayLike,
-    *,
-    wavenumber: Wavenumbers,
-    boundary: BoundaryLike = ...,
-    order: int = ...,
-    length: Length = ...,
+    body: Surface, ports: ArrayLike, *, wavenumber: Wavenumbers, **more: Unpack[_Bounded]
 ) -> list[Coupling]: ...
 def coupling(
     body: Surface,
@@ -112,18 +107,16 @@ def coupling(
     >>> np.abs(u[0, 1:]).round(4).tolist(), bool(np.all(u[0, 1:] == u[1:, 0]))
     ([0.1065, 0.0173], True)
     """
-    k = _checked_waves(body, wavenumber, order, "ports", boundary)
-    y = _checked_ports(body, ports)
-    return _coupled(body, y, None, ["point"] * len(y), k, order, length, boundary_name(boundary))
+    return _coupled(body, ports, None, "point", wavenumber, order, length, "ports", boundary)
 
 
 @overload
 def slot_coupling(
-    body: Surface, ports: ArrayLike, axes: ArrayLike, *, wavenumber: float, order: int = ..., length: Length = ...
+    body: Surface, ports: ArrayLike, axes: ArrayLike, *, wavenumber: float, **more: Unpack[_More]
 ) -> Coupling: ...
 @overload
 def slot_coupling(
-    body: Surface, ports: ArrayLike, axes: ArrayLike, *, wavenumber: Wavenumbers, order: int = ..., length: Length = ...
+    body: Surface, ports: ArrayLike, axes: ArrayLike, *, wavenumber: Wavenumbers, **more: Unpack[_More]
 ) -> list[Coupling]: ...
 def slot_coupling(
     body: Surface,
@@ -182,18 +175,14 @@ def slot_coupling(
     >>> np.abs(abreast[0, 1:]).round(3).tolist(), np.abs(in_line[0, 1:]).round(3).tolist()
     ([3.76, 0.689], [0.256, 0.022])
     """
-    k = _checked_waves(body, wavenumber, order, "slots")
-    y = _checked_ports(body, ports)
-    return _coupled(body, y, axes, ["slot"] * len(y), k, order, length)
+    return _coupled(body, ports, axes, "slot", wavenumber, order, length, "slots")
 
 
 @overload
-def monopole_coupling(
-    body: Surface, ports: ArrayLike, *, wavenumber: float, order: int = ..., length: Length = ...
-) -> Coupling: ...
+def monopole_coupling(body: Surface, ports: ArrayLike, *, wavenumber: float, **more: Unpack[_More]) -> Coupling: ...
 @overload
 def monopole_coupling(
-    body: Surface, ports: ArrayLike, *, wavenumber: Wavenumbers, order: int = ..., length: Length = ...
+    body: Surface, ports: ArrayLike, *, wavenumber: Wavenumbers, **more: Unpack[_More]
 ) -> list[Coupling]: ...
 def monopole_coupling(
     body: Surface,
@@ -246,21 +235,12 @@ def monopole_coupling(
     >>> np.abs(E[0, 1:]).round(3).tolist(), bool(np.all(E[0, 1:] == E[1:, 0]))
     ([4.083, 0.752], True)
     """
-    k = _checked_waves(body, wavenumber, order, "monopoles")
-    y = _checked_ports(body, ports)
-    return _coupled(body, y, None, ["monopole"] * len(y), k, order, length)
+    return _coupled(body, ports, None, "monopole", wavenumber, order, length, "monopoles")
 
 
 @overload
 def antenna_coupling(
-    body: Surface,
-    slots: ArrayLike,
-    axes: ArrayLike,
-    monopoles: ArrayLike,
-    *,
-    wavenumber: float,
-    order: int = ...,
-    length: Length = ...,
+    body: Surface, slots: ArrayLike, axes: ArrayLike, monopoles: ArrayLike, *, wavenumber: float, **more: Unpack[_More]
 ) -> Coupling: ...
 @overload
 def antenna_coupling(
@@ -270,8 +250,7 @@ def antenna_coupling(
     monopoles: ArrayLike,
     *,
     wavenumber: Wavenumbers,
-    order: int = ...,
-    length: Length = ...,
+    **more: Unpack[_More],
 ) -> list[Coupling]: ...
 def antenna_coupling(
     body: Surface,
@@ -340,7 +319,6 @@ def antenna_coupling(
     >>> found.kinds.tolist()
     ['slot', 'monopole', 'monopole']
     """
-    k = _checked_waves(body, wavenumber, order, "antennas")
     parts = [as_points(given) for given in (slots, monopoles)]
     shapes = [part.shape for part in parts]
     if any(part.ndim != 2 or not len(part) for part in parts):
@@ -348,17 +326,8 @@ def antenna_coupling(
             f"slots have shape {shapes[0]} and monopoles {shapes[1]}; give one or more of each as (n, 3), or use "
             "slot_coupling or monopole_coupling for one kind"
         )
-    y = _checked_ports(body, np.concatenate(parts))
-    return _coupled(body, y, axes, ["slot"] * len(parts[0]) + ["monopole"] * len(parts[1]), k, order, length)
-
-
-def _checked_waves(
-    body: Surface, wavenumber: float | Wavenumbers, order: int, what: str, boundary: BoundaryLike = "hard"
-) -> float | list[float]:
-    """One wavenumber or a list of them, each checked."""
-    if isinstance(wavenumber, str) or np.ndim(wavenumber) != 1:
-        return checked_wave(body, wavenumber, order, what, boundary)  # type: ignore[arg-type]
-    return [checked_wave(body, one, order, what, boundary) for one in real_array(wavenumber, "wavenumber").tolist()]
+    kinds = np.repeat(["slot", "monopole"], [len(part) for part in parts])
+    return _coupled(body, np.concatenate(parts), axes, kinds, wavenumber, order, length, "antennas")
 
 
 def checked_wave(body: Surface, wavenumber: float, order: int, what: str, boundary: BoundaryLike = "hard") -> float:
@@ -419,36 +388,51 @@ def port_geodesics(
     """All between ports (n, 3), L, up to a length, L; from the first so many, if not from all."""
     # so far from a caustic a port is close to it
     pad = float(2 * np.cbrt(size(body) / k**2))
-    return rays_between(body, ports, _fan_length(body, k, length), pad=pad, sources=sources)
-
-
-def _fan_length(body: Surface, k: float, length: Length) -> float:
-    """Length of geodesics, L: "auto" is by the decay of the first mode at the root mean square curvature to e^-13."""
     if not (isinstance(length, str) and length == AUTO):
-        return positive_number(length, "length")
-    box = np.asarray(body.bounds, dtype=float)
-    girth = np.pi * float(np.max(box[1] - box[0]))
-    typical = float(np.median(curvature_norms(body, points_of_charts(body)))) / np.sqrt(2)
-    decay = float(hard_modes().tau[0].imag) * np.cbrt(k / 2) * np.cbrt(typical) ** 2
-    return float(np.clip(13 / decay, 0.65 * girth, 1.2 * girth))
+        long = positive_number(length, "length")
+    else:
+        # by the decay of the first mode at the root mean square curvature, to e^-13
+        girth = np.pi * float(np.max(np.ptp(np.asarray(body.bounds, dtype=float), axis=0)))
+        typical = float(np.median(curvature_norms(body, points_of_charts(body)))) / np.sqrt(2)
+        decay = float(hard_modes().tau[0].imag) * np.cbrt(k / 2) * np.cbrt(typical) ** 2
+        long = float(np.clip(13 / decay, 0.65 * girth, 1.2 * girth))
+    return rays_between(body, ports, long, pad=pad, sources=sources)
 
 
 def _coupled(
     body: Surface,
-    ports: FloatArray,
+    ports: ArrayLike,
     axes: ArrayLike | None,
-    kinds: list[str],
-    k: float | list[float],
+    kinds: str | Words,
+    wavenumber: float | Wavenumbers,
     order: int,
     length: Length,
-    boundary: str = "pec",
+    what: str,
+    boundary: BoundaryLike = "hard",
 ) -> Coupling | list[Coupling]:
     """The matrix of ports of given kinds, slots first, which have axes; of several wavenumbers a list."""
-    if isinstance(k, list):
-        # geodesics take a small part of the time: each wave traces its own, of the length that it needs
-        return [_coupled(body, ports, axes, kinds, one, order, length, boundary) for one in k]  # type: ignore[misc]
-    named, n = np.array(kinds), len(ports)
-    slots = named == "slot"
+    many = not isinstance(wavenumber, str) and np.ndim(wavenumber) == 1
+    waves: Any = real_array(wavenumber, "wavenumber").tolist() if many else [wavenumber]
+    waves = [checked_wave(body, one, order, what, boundary) for one in waves]
+    y = _checked_ports(body, ports)
+    named, name = np.broadcast_to(kinds, len(y)), boundary_name(boundary) if what == "ports" else "pec"
+    # geodesics take a small part of the time: each wave traces its own, of the length that it needs
+    found = [_matrix(body, y, axes, named, k, order, length, name) for k in waves]
+    return found if many else found[0]
+
+
+def _matrix(
+    body: Surface,
+    ports: FloatArray,
+    axes: ArrayLike | None,
+    named: Words,
+    k: float,
+    order: int,
+    length: Length,
+    boundary: str,
+) -> Coupling:
+    """The matrix at one wavenumber."""
+    n, slots = len(ports), named == "slot"
     # checked before fans are traced
     along = normal(body, ports)
     if axes is not None:

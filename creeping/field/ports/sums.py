@@ -176,13 +176,20 @@ def port_sums(waves: PathWaves) -> PortSums:
     shape = rays.folds.shape
     count, pair = rays.folds.size, rays.first * shape[1] + rays.second
     merging = merging_of(pair, rays.caustics, rays.arclength, waves.sizes, k, count)
-    lost, ended = (waves.scale * wave for wave in _lost(rays, k))
+    # what geodesics beyond the fans' length, and ended ones, would bring
+    slow = float(np.quantile(rays.integrals[:, 0] / rays.arclength, SPARED)) if len(rays) else 0.0
+    reached = np.full(count, rays.length * slow), rays.ended.ravel()
+    lost, ended = (waves.scale * _first_mode(rays, A, k) for A in reached)
     with np.errstate(invalid="ignore"):
         values, strength, error = (total_of(of, pair, count) for of in (waves.values, waves.sizes, waves.own))
         folds = waves.scale * _first_mode(rays, rays.folds.ravel(), k)
         # half or twice of either share leaves errors of rays and beams within a tenth (``port_coverage``)
         merges = (merging > 0.03 * strength) | (folds > 0.1 * strength)
-        merges[pair[_narrow(rays, k)]] = True
+        # geodesics that end on their caustics
+        rho = np.cbrt(np.prod(1 / np.maximum(rays.curvature, 1e-300), axis=1) * rays.arclength)
+        share = np.abs(rays.spreading) / (np.abs(rays.spreading) + rho * np.mean(np.abs(rays.rates), axis=1))
+        m = np.cbrt(k * np.sqrt(np.prod(1 / rays.curvature, axis=1)) / 2)
+        merges[pair[(share * m < NARROW) & (rays.arclength > 0.25 * size(rays.body))]] = True
         error = np.sqrt(error**2 + merging**2 + lost**2 + ended**2)
     status = np.where(merges, int(FieldStatus.CAUSTIC), int(FieldStatus.OK))
     # waves of a focus are (ka)^(1/2) times those of a ray
@@ -203,28 +210,12 @@ def port_sums(waves: PathWaves) -> PortSums:
     return PortSums(*(getattr(found, part.name).reshape(shape) for part in fields(found)))
 
 
-def _narrow(rays: PortRays, k: float) -> BoolArray:
-    """Whether each geodesic (m,) ends on its caustic."""
-    rho = np.cbrt(np.prod(1 / np.maximum(rays.curvature, 1e-300), axis=1) * rays.arclength)
-    share = np.abs(rays.spreading) / (np.abs(rays.spreading) + rho * np.mean(np.abs(rays.rates), axis=1))
-    m = np.cbrt(k * np.sqrt(np.prod(1 / rays.curvature, axis=1)) / 2)
-    return np.asarray((share * m < NARROW) & (rays.arclength > 0.25 * size(rays.body)))
-
-
 def _first_mode(rays: PortRays, A: FloatArray, k: float) -> FloatArray:
     """About the wave of the first mode where int kappa_n^(2/3) ds is A (count,), 1/L; 0 where it is infinite."""
     tau, root = hard_modes().tau[0], np.cbrt(k / 2)
     typical = float(np.median(rays.curvature)) if len(rays) else 1 / size(rays.body)
     scale = np.cbrt(typical) * np.sqrt(root / (np.pi * size(rays.body))) / (2 * abs(tau))
     return np.asarray(scale * np.exp(-tau.imag * root * A))
-
-
-def _lost(rays: PortRays, k: float) -> tuple[FloatArray, FloatArray]:
-    """What geodesics beyond the fans' length, and ended ones, would bring to each entry, 1/L."""
-    rate = rays.integrals[:, 0] / rays.arclength
-    slow = float(np.quantile(rate, SPARED)) if len(rays) else 0.0
-    longer = _first_mode(rays, np.full(rays.folds.size, rays.length * slow), k)
-    return longer, _first_mode(rays, rays.ended.ravel(), k)
 
 
 def _put_beams(waves: PathWaves, asked: IntArray, found: PortSums, strength: FloatArray) -> None:

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 PARTS = ("incident", "scattered", "creeping")
 """Parts of a field near a conductor."""
-ON_BODY = {"values": "values", "lit": "wave", "creeping": "creeping"}
-"""What parts of a current are of `PointValues`."""
 E, H = slice(0, 3), slice(3, 6)
 """Where both fields stand among six components."""
 
@@ -192,7 +190,8 @@ def vector_on_body(
     single: bool,
 ) -> ConductorCurrent:
     """J of each polarisation, and n.E with its error (n, p), at points of the body (..., 3), judged."""
-    lanes = {name: [getattr(one, of) for one in columns] for name, of in ON_BODY.items()}
-    lanes |= {name: list(values.T) for name, values in zip(("charge", "charge_error"), charge, strict=True)}
+    names = {"values": "values", "lit": "wave", "creeping": "creeping"}
+    lanes = {name: [getattr(one, of) for one in columns] for name, of in names.items()}
+    lanes |= {"charge": list(charge[0].T), "charge_error": list(charge[1].T)}
     named = {name: by_polarisation(values, points.shape[:-1], single=single) for name, values in lanes.items()}
     return ConductorCurrent(**named, **stated(columns, points, 1.0, single=single), **facts)

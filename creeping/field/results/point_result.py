@@ -21,6 +21,7 @@ from creeping._presenting import Shown
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray, IntArray
 from creeping.field.results.labelled import COMPONENTS, ArrayResult, Tabled, dataset, power
 from creeping.field.validity_range import Validity
+from creeping.geometry.patches import Rows
 
 if TYPE_CHECKING:
     import xarray
@@ -263,7 +264,7 @@ class SurfaceField(PointField):
 
 
 @dataclass(frozen=True, eq=False)
-class PointValues:
+class PointValues(Rows):
     """Field at points (n,), and by what it came.
 
     Attributes
@@ -297,10 +298,6 @@ class PointValues:
         if size.ndim == 1:
             return np.asarray(size)
         return np.asarray(np.linalg.norm(size.reshape(len(size), size.shape[1] // 3, 3), axis=2).max(axis=1))
-
-    def __getitem__(self, at: IntArray | BoolArray) -> PointValues:
-        """Some of the points."""
-        return PointValues(*(getattr(self, one.name)[at] for one in fields(self)))
 
     def parts(self, incident: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """The incident wave (n, ...), what it excites, and creeping rays: they add up to the values.

@@ -37,27 +37,15 @@ Sources: [P82], [CPP82]; Derivations, F22, F24 and F25. A to C were set on the t
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from creeping._typing import Any, BoolArray, ComplexArray, FloatArray
-from creeping.field.arguments import fock_parameter
 from creeping.field.boundary import Boundary
-from creeping.field.results.point_result import FieldStatus
 from creeping.field.waves.far_geometry import fan_strips
-from creeping.field.waves.ray_sums import (
-    FADED,
-    LOST,
-    RaySum,
-    fan_decay,
-    fold_share,
-    magnitude,
-    merging_error,
-    total_of,
-)
+from creeping.field.waves.ray_sums import LOST, RaySum, fold_share, judged_sum, magnitude, merging_error, total_of
 from creeping.field.waves.shed_wave import smoothstep
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.pieces import trace_pieces
@@ -193,19 +181,6 @@ Components = Callable[[int, FloatArray, FloatArray, BodyNodes, FloatArray], tupl
 """V and V' (n, c) of a vector's beams at places sigma, s (n,) of a strip, points of the body and tangents (n, 3)."""
 
 
-@dataclass(frozen=True, eq=False)
-class BeamSums:
-    """Sums of beams at points (n,), by feet within CUT widths of the line and beyond.
-
-    Attributes
-    ----------
-    early, late : (n,) complex, (n, c) of a vector
-    """
-
-    early: ComplexArray
-    late: ComplexArray
-
-
 def width(fan: RayFan, wavenumber: float) -> float:
     """Width w of beams at the shadow line, L."""
     return float(np.sqrt(beam_length(fan.body) / (WIDTH * wavenumber)))
@@ -230,10 +205,13 @@ def beam_sums(
     fan: RayFan,
     waves: StripWaves,
     points: FloatArray,
-    factors: tuple[float, ...] = (1.0,),
-    components: Components | None = None,
-) -> list[BeamSums]:
-    """Beams of each eps = factor WIDTH/a at points of the body (n, 3), L; those of a vector have ``components``."""
+    factors: tuple[float, ...],
+    components: Components | None,
+) -> list[ComplexArray]:
+    """Beams of each eps = factor WIDTH/a at points of the body (n, 3), L; those of a vector have ``components``.
+
+    Sums (2, n) or (2, n, c) by feet within CUT widths of the line and beyond.
+    """
     sums: list[list[ComplexArray]] = [[] for _ in factors]
     for number, strip in enumerate(waves.strips):
         (low, high), (count, steps) = strip.span, _counts(strip, fan.length, waves.wavenumber)
@@ -247,7 +225,7 @@ def beam_sums(
             for mine, factor in zip(sums, factors, strict=True):
                 mine.append(beams.sums(points, WIDTH / beams.a * factor, cut))
     both = [np.sum(mine, axis=0) if mine else np.zeros((2, len(points), 1), dtype=complex) for mine in sums]
-    return [BeamSums(*(one[..., 0] if components is None else one)) for one in both]
+    return [one[..., 0] if components is None else one for one in both]
 
 
 def _beams_of(
@@ -308,15 +286,15 @@ def beams_beside_rays(
     points: FloatArray,
     own: ComplexArray,
     share: FloatArray,
-    components: Components | None = None,
+    components: Components | None,
 ) -> tuple[ComplexArray, ComplexArray]:
     """Sums of beams of both widths at points (n, 3), the waves ``own`` (m, ...) of young rays with them: (n, ...)."""
     near, clear = _apart_from_line(fan, shed, waves.wavenumber, len(points))
     alone = total_of(np.where(wide(near, own), own, 0.0), shed.observer, len(points))
     clear, share = wide(clear, alone), wide(share, alone)
 
-    def together(sums: BeamSums) -> ComplexArray:
-        early, late = sums.early.reshape(alone.shape), sums.late.reshape(alone.shape)
+    def together(sums: ComplexArray) -> ComplexArray:
+        early, late = (one.reshape(alone.shape) for one in sums)
         return np.asarray(clear * (share * early + late) + (1 - clear) * (alone + late))
 
     by_beams, others = (together(sums) for sums in beam_sums(fan, waves, points, FACTORS, components))
@@ -340,32 +318,8 @@ def blended_sum(
     Where rays merge they err by shares of ``strength``, by themselves by shares of ``size`` (m,), which is bounded.
     ``part`` (m,) is the error of each wave as a share of it, 1 or more where there is none.
     """
-    values, rest = _blended(fan, shed, own, strength, size, eta, beams, wavenumber)
-    bounded = np.where(np.isfinite(part), np.minimum(part, 1.0), 1.0)
-    # at a focus more rays come than those that are found
-    sums = total_of(size, shed.observer, len(values))
-    field = magnitude(values, sums)
-    more = np.maximum(1.0, field / np.maximum(sums, 1e-300))
-    # and at one where all rays of a fan come their number says how dense it is, and no more
-    crowd = total_of(np.ones(len(size)), shed.observer, len(values)) > 8
-    more = np.where(crowd, np.minimum(more, 2 * field / np.maximum(sums, 1e-300)), more)
-    error = np.hypot(more * total_of(size * bounded, shed.observer, len(values)), rest)
-    return _judged(fan, shed, size, values, error, part >= 1, wavenumber, boundary)
-
-
-def _blended(
-    fan: RayFan,
-    shed: ShedRays,
-    own: ComplexArray,
-    strength: FloatArray,
-    size: FloatArray,
-    eta: FloatArray,
-    beams: tuple[ComplexArray, ComplexArray],
-    wavenumber: float,
-) -> tuple[ComplexArray, FloatArray]:
-    """The field (n, ...) of rays (m, ...) and of beams, and the error of merging."""
-    by_beams, others = beams
-    count, observer = len(by_beams), shed.observer
+    (by_beams, others), observer = beams, shed.observer
+    count = len(by_beams)
     plain = np.zeros(count)
     by_rays = total_of(own, observer, count)
     e_b = np.sqrt(total_of((size * (LEAST + np.minimum(VARIES * eta, 1.0))) ** 2, observer, count))
@@ -379,42 +333,23 @@ def _blended(
     both = e_r**2 + e_b**2
     with np.errstate(invalid="ignore", divide="ignore"):
         beta = wide(np.where(both > 0, e_r**2 / both, 0.0), by_beams)
+        # the error of merging
         rest = np.where(both > 0, e_r * e_b / np.sqrt(both), 0.0)
-    return np.asarray((1 - beta) * by_rays + beta * by_beams), rest
-
-
-def _judged(
-    fan: RayFan,
-    shed: ShedRays,
-    size: FloatArray,
-    values: ComplexArray,
-    error: FloatArray,
-    lacking: BoolArray,
-    k: float,
-    boundary: Boundary,
-) -> RaySum:
-    """The sum with its status: what ends with the fan, and what no wave is known of."""
-    count, observer = len(values), shed.observer
-    decay, end = fan_decay(fan, k, boundary)
-    xi = fock_parameter(shed.rays, k)
-    strength = total_of(size, observer, count)
-    lost = total_of(np.where(size > 0, size * np.exp(-decay * np.maximum(end - xi, 0.0)), 0.0), observer, count)
+    values = np.asarray((1 - beta) * by_rays + beta * by_beams)
+    bounded = np.where(np.isfinite(part), np.minimum(part, 1.0), 1.0)
+    # at a focus more rays come than those that are found
+    sums = total_of(size, observer, count)
+    field = magnitude(values, sums)
+    more = np.maximum(1.0, field / np.maximum(sums, 1e-300))
+    # and at one where all rays of a fan come their number says how dense it is, and no more
+    crowd = total_of(np.ones(len(size)), observer, count) > 8
+    more = np.where(crowd, np.minimum(more, 2 * field / np.maximum(sums, 1e-300)), more)
+    error = np.hypot(more * total_of(size * bounded, observer, count), rest)
     # a ray without a wave, or with one that errs by its size
-    none = np.zeros(count, dtype=bool)
-    none[observer[lacking & (size == 0)]] = True
-    unknown = none | (total_of(np.where(lacking, size, 0.0), observer, count) > LOST * strength)
-    status = np.select(
-        [unknown, strength == 0, lost > LOST * strength],
-        [
-            FieldStatus.DETACHED,
-            FieldStatus.TRUNCATED if np.exp(-decay * end) > FADED else FieldStatus.NO_RAY,
-            FieldStatus.TRUNCATED,
-        ],
-        FieldStatus.OK,
-    )
-    error = np.hypot(error, lost)
-    error = np.where(status == FieldStatus.OK, error, np.fmax(error, strength))
-    return RaySum(values, error, status.astype(np.int64), total_of(np.exp(-decay * xi), observer, count))
+    lacking = part >= 1
+    unknown = total_of(np.where(lacking, size, 0.0), observer, count) > LOST * sums
+    unknown[observer[lacking & (size == 0)]] = True
+    return judged_sum(fan, shed, size, values, error, (unknown, np.zeros(count, bool)), wavenumber, boundary)
 
 
 def wide(values: FloatArray | BoolArray | ComplexArray, like: ComplexArray) -> Any:

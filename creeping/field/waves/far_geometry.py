@@ -41,12 +41,12 @@ from creeping.rays.quantities import RayPoints
 from creeping.rays.shedding import ShedRays, free_ways
 from creeping.rays.specular import SpecularPoints, specular_points
 from creeping.rays.strips import Strip, strips_of
-from creeping.rays.tracer import TURN, RayTracer, rays_towards, same_within
+from creeping.rays.tracer import TURN, RaySearch, RayTracer, same_within
 from creeping.rays.transport import Flow, carried
 from creeping.shadow.attachment import LaunchPoints, occluded
 from creeping.shadow.line import ShadowLine, shares_of
 from creeping.shadow.meshes import prepared
-from creeping.shadow.status import ATTACHED, NO_RAY
+from creeping.shadow.status import NO_RAY, PointState
 from creeping.storage.memory import within_budget
 
 EARLY = 0.28
@@ -69,22 +69,17 @@ def far_geometry(fan: RayFan, observation: ArrayLike) -> "FarGeometry":
     def make() -> FarGeometry:
         tracer = RayTracer(fan.body, fan.length)
         # not the fan itself: this is kept as long as the fan lives
-        line, make = fan.line, _forward_parts(fan)
+        line, known = fan.line, ref(fan)
+
+        def forward(_: int) -> tuple[ShadowLine, tuple[Strip, ...]]:
+            found = known()
+            assert found is not None
+            return line, fan_strips(found)
+
         attached = np.array([(line.fractions if is_piecewise(line.body) else shares_of(line))["attached"]])
-        return FarGeometry(fan.flow, launched_by(fan), tracer, r[None], attached, lambda _: (line, make()))
+        return FarGeometry(fan.flow, launched_by(fan), tracer, r[None], attached, forward)
 
     return memo_of(fan, "far geometry", r.tobytes(), make, 1)
-
-
-def _forward_parts(fan: RayFan) -> "Callable[[], tuple[Strip, ...]]":
-    known = ref(fan)
-
-    def make() -> tuple[Strip, ...]:
-        found = known()
-        assert found is not None
-        return fan_strips(found)
-
-    return make
 
 
 def launched_by(fan: RayFan) -> LaunchPoints:
@@ -106,7 +101,7 @@ def launched_by(fan: RayFan) -> LaunchPoints:
         arc.astype(float),
         fan.spacing[mine],
         closed,
-        np.full(len(mine), ATTACHED),
+        np.full(len(mine), PointState.ATTACHED),
     )
     return LaunchPoints(fan.line.direction[None], *(row[None] for row in rows))
 
@@ -260,8 +255,8 @@ class FarGeometry:
         long = fine[sample + 1] - fine[sample]
         begin = fine[sample] + along * long
         cell = np.stack([launch.spacing[which, ray], long], axis=1)
-        sought = self.direction[row], self.directions[row], near, begin, cell
-        one, found, moved = rays_towards(self.tracer, *sought)
+        search = RaySearch(self.tracer, self.direction[row], self.directions[row], near, begin, cell)
+        one, found = search.result()
         row, ray, cell, across, which = row[found], ray[found], cell[found], across[found, 0], which[found]
         arc = launch.arc_index
         same = arc[which] == arc[which, ray][:, None]
@@ -269,7 +264,7 @@ class FarGeometry:
             # of no rays at all there is no first one
             same = np.zeros((0, 1), dtype=bool)
         first, last = np.argmax(same, axis=1), same.shape[1] - 1 - np.argmax(same[:, ::-1], axis=1)
-        place = ray + across + moved
+        place = ray + across + search.moved[found]
         inside = (launch.closed[which, ray] == 1) | ((place >= first - 0.5) & (place <= last + 0.5))
         kept = np.flatnonzero(inside)
         starts, found_rays = one.starts[kept], one.rays[kept]

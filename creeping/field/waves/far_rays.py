@@ -44,7 +44,6 @@ from creeping.field.waves.reflected import (
 from creeping.field.waves.shed_wave import shed_orders, smoothstep
 from creeping.geometry.surface import size
 from creeping.rays.quantities import RayPoints
-from creeping.rays.shedding import ShedRays
 from creeping.rays.specular import SpecularPoints
 
 MATTERS = 0.05
@@ -196,7 +195,7 @@ class Parts:
         self._add_rays(number, kind, share)
         if np.any(self.in_fan > 0):
             self._add_fan(number, kind)
-        self._add_reflected(number, kind)
+        self._add_specular(number, kind, g.specular, (1 - w)[g.specular.observer])
         if np.any(w > 0):
             self._add_forward(number, kind)
 
@@ -211,14 +210,11 @@ class Parts:
         wave = second if self.order == 2 else first
         off = beyond(np.abs(second - first), wave, self.order, self.unsure)
         if self.vector:
-            self._doubt_turning(shed, wave)
+            # what may pass from creeping waves of one polarisation into the other on their way
+            passing = np.nan_to_num(turning(shed.rays, self.wavenumber) * np.abs(wave))
+            np.add.at(self.doubt, shed.observer, passing[:, None, None] ** 2)
         each, doubts = (self._each(number, shed.observer, one, *normals) for one in (wave, off))
         self._add_apart(self.creeping, shed.observer, each, doubts, merged)
-
-    def _doubt_turning(self, shed: ShedRays, wave: ComplexArray) -> None:
-        """Note what may pass from creeping waves (n,) of one polarisation into the other on their way."""
-        share = np.nan_to_num(turning(shed.rays, self.wavenumber) * np.abs(wave))
-        np.add.at(self.doubt, shed.observer, share[:, None, None] ** 2)
 
     def _add_fan(self, number: int, kind: Boundary) -> None:
         g, k = self.geometry, self.wavenumber
@@ -228,10 +224,6 @@ class Parts:
         waves = fan_half(nodes, g.directions, k, kind)
         sums = [self._summed(number, nodes.observer, _weighted(share, wave), *normals) for wave in waves]
         self._add_whole(self.creeping, *sums)
-
-    def _add_reflected(self, number: int, kind: Boundary) -> None:
-        s = self.geometry.specular
-        self._add_specular(number, kind, s, (1 - self.in_forward)[s.observer])
 
     def _add_specular(self, number: int, kind: Boundary, s: SpecularPoints, share: FloatArray) -> None:
         """Add specular points (n,), each by a share (n,)."""
@@ -412,8 +404,8 @@ def sheets_of(geometry: FarGeometry, parts: list[Parts]) -> Sheets:
     )
     waves = np.concatenate(
         [
-            np.concatenate([_columns(one.shed_waves, len(shed.observer)) for one in parts], axis=1),
-            np.concatenate([_columns(one.specular_waves, len(points)) for one in parts], axis=1),
+            np.concatenate([_columns(one.shed_waves, len(shed.observer), _width(one)) for one in parts], axis=1),
+            np.concatenate([_columns(one.specular_waves, len(points), _width(one)) for one in parts], axis=1),
         ]
     )
     numbers = np.concatenate([np.full(_width(one), one.wavenumber) for one in parts])
@@ -439,10 +431,6 @@ def _width(parts: Parts) -> int:
     return 4 if parts.vector else 1
 
 
-def _columns(waves: list[ComplexArray], count: int) -> ComplexArray:
-    """Contributions of both polarisations of a conductor, or of the one scalar problem, as columns (count, ...)."""
-    return np.asarray(np.sum(waves, axis=0, dtype=complex).reshape(count, -1) if count else np.zeros((0, _size(waves))))
-
-
-def _size(waves: list[ComplexArray]) -> int:
-    return int(np.prod(waves[0].shape[1:], dtype=int))
+def _columns(waves: list[ComplexArray], count: int, width: int) -> ComplexArray:
+    """Contributions of both polarisations of a conductor, or of the one scalar problem, as columns (count, width)."""
+    return np.asarray(np.sum(waves, axis=0, dtype=complex).reshape(count, width))

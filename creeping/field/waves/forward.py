@@ -45,7 +45,9 @@ def shadow_half(
     g = np.exp(-0.25j * np.pi) * shed_wave(
         rays, wavenumber, boundary, order, transverse_weight=0.5, pole_share=np.where(xi > 0, pole_share * c**2, 0.0)
     )
-    return _crossing_wave(nodes, r, wavenumber, g)
+    factor = _crossing_factor(nodes, r, wavenumber)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.where(factor != 0, factor * g, 0.0))
 
 
 def fan_half(
@@ -57,13 +59,6 @@ def fan_half(
     # a ray that has ended counts for nothing, whatever its numbers
     first, second = (np.where(factor != 0, factor * wave, 0.0) for wave in (first, second))
     return first, second
-
-
-def _crossing_wave(nodes: HorizonRays, r: FloatArray, wavenumber: float, g: ComplexArray) -> ComplexArray:
-    """Integrand (n,), L, of waves g (n,)."""
-    factor = _crossing_factor(nodes, r, wavenumber)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.where(factor != 0, factor * g, 0.0))
 
 
 def _crossing_factor(nodes: HorizonRays, r: FloatArray, wavenumber: float) -> ComplexArray:

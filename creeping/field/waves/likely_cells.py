@@ -28,7 +28,7 @@ at most.
 Sources: [LK59]; Derivations, R12, F3 and F4.
 """
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -37,6 +37,7 @@ from creeping.field.arguments import scales
 from creeping.field.boundary import Boundary, fock_scale, modes_of
 from creeping.field.waves.shed_wave import shed_wave
 from creeping.geodesics.attenuation import curvature_values
+from creeping.geodesics.pieces import to_tips
 from creeping.geodesics.states import M11, P, X
 from creeping.geometry.piecewise import tips_of
 from creeping.geometry.surface import Surface, size
@@ -62,67 +63,47 @@ def likely_found(
     found: IntArray,
     directions: FloatArray,
     places: FloatArray,
-) -> BoolArray:
-    """`likely_cells` of several incidences: states (n, rays, K, lanes), cells (m, 4) as the search numbers them.
+) -> IntArray:
+    """Numbers of the cells in which a ray towards their observers is likely.
 
-    ``ends`` (n, rays, 2) has the time at which each ray ends, and the number of the crease, as lanes have them.
+    Parameters
+    ----------
+    body : PiecewiseSurface
+    states : (n, rays, K, 7 or more)
+        At equal steps.
+    ends : (n, rays, 2)
+        Time at which each ray ends, and the number of the crease, as lanes have them.
+    spacing : (n, rays), L
+    parts, step : int, float
+        Samples of a step, and its time.
+    incidence : (m,)
+        Of each cell.
+    found : (m, 4)
+        Observer, both rays and first sample of each cell.
+    directions : (observers, 3)
+    places : (m, 2)
+        Nearest fractions of the cell, across the rays and along them.
     """
     rays, long = found[:, 1:3], step / parts
     begin, end = (found[:, 3] + places[:, 1]) * long, ends[incidence[:, None], rays, 0]
     at_tip = np.isin(ends[incidence[:, None], rays, 1], tips_of(body)[0])
     # an edge ends rays one after the other, a tip one of them alone
     until = np.fmin(np.max(end, axis=1), np.min(np.where(at_tip, end, np.inf), axis=1))
-    likely = begin <= until + long
-    for number in np.unique(incidence[likely]):
-        mine = np.flatnonzero(likely & (incidence == number))
-        row, ray, after, sample = found[mine].T
-        rays, seen = np.stack([ray, after], axis=1), (directions[row], places[mine], spacing[number, ray])
-        likely[mine] = likely_cells(body, states[number], rays, sample, parts, step, *seen)
-    return np.asarray(likely)
-
-
-def likely_cells(
-    body: Any,
-    states: FloatArray,
-    rays: IntArray,
-    sample: IntArray,
-    parts: int,
-    step: float,
-    observers: FloatArray,
-    places: FloatArray,
-    spacing: FloatArray,
-) -> BoolArray:
-    """Whether a ray towards its observer is likely in each cell (n,).
-
-    Parameters
-    ----------
-    body : PiecewiseSurface
-    states : (rays, K, 7 or more)
-        At equal steps.
-    rays : (n, 2)
-        Of each cell.
-    sample : (n,)
-        First of both samples of each, ``parts`` of them a step.
-    parts, step : int, float
-    observers : (n, 3)
-    places : (n, 2)
-        Nearest fractions of the cell, across the rays and along them.
-    spacing : (n,), L
-        Share of the line that the first ray stands for.
-    """
-    n = len(sample)
-    if not n:
-        return np.zeros(0, dtype=bool)
+    likely = np.flatnonzero(begin <= until + long)
+    if not len(likely):
+        return likely
+    n, rays, sample, incidence = len(likely), rays[likely], found[likely, 3], incidence[likely]
+    observers = directions[found[likely, 0]]
     corner = np.stack([sample, sample + 1], axis=1)[:, None].repeat(2, axis=1)
-    owner = rays[:, :, None].repeat(2, axis=2)
-    x, p = _between(states, owner.reshape(-1), corner.reshape(-1), parts, step)
+    owner = (incidence[:, None] * states.shape[1] + rays)[:, :, None].repeat(2, axis=2)
+    x, p = _between(states.reshape(-1, *states.shape[2:]), owner.reshape(-1), corner.reshape(-1), parts, step)
     g = np.asarray(body.gradient(x))
     with np.errstate(all="ignore"):
         normal = g / np.linalg.norm(g, axis=1, keepdims=True)
         p = p / np.linalg.norm(p, axis=1, keepdims=True)
         r = np.repeat(observers, 4, axis=0)
         f, h, ahead = (np.sum(v * r, axis=1).reshape(n, 2, 2) for v in (normal, np.cross(normal, p), p))
-        u, v = places.T
+        u, v = places[likely].T
         (f0, fu, fv), (h0, hu, hv) = _bilinear(f, u, v), _bilinear(h, u, v)
         determinant = fu * hv - fv * hu
         u1, v1 = u - (f0 * hv - fv * h0) / determinant, v - (fu * h0 - f0 * hu) / determinant
@@ -130,22 +111,15 @@ def likely_cells(
         apart = np.linalg.norm(corners_of - observers[:, None], axis=2).min(axis=1)
         wide = np.linalg.norm(corners_of[:, :, None] - corners_of[:, None], axis=3).max(axis=(1, 2))
         off = np.maximum(np.abs(u1 - 0.5), np.abs(v1 - 0.5))
-        bent = (off > 8) | (_from_tips(body, x).reshape(n, 4).min(axis=1) < 0.03 * size(body))
+        bent = (off > 8) | (to_tips(tips_of(body)[1], x).reshape(n, 4).min(axis=1) < 0.03 * size(body))
         near = (off <= 1.5) | bent | (apart <= 0.1)
         reach = np.where(bent, 0.4, np.minimum(0.6 * wide, 0.4))
         towards = _bilinear(ahead, np.clip(u1, 0, 1), np.clip(v1, 0, 1))[0] > 0.8
-        corners, J = x.reshape(n, 2, 2, 3), states[rays, np.minimum(sample // parts, states.shape[1] - 1)[:, None], M11]
-        one = parted(body, corners[:, 0], corners[:, 1], np.max(np.abs(J), axis=1)[:, None], spacing[:, None])
+        corners, last = x.reshape(n, 2, 2, 3), np.minimum(sample // parts, states.shape[2] - 1)
+        J, spacing = states[incidence[:, None], rays, last[:, None], M11], spacing[incidence, rays[:, 0], None]
+        one = parted(body, corners[:, 0], corners[:, 1], np.max(np.abs(J), axis=1)[:, None], spacing)
         # where nothing can be told, a cell is likely
-        return np.asarray(((near & towards & (apart <= reach)) | ~np.isfinite(u1 + v1)) & ~np.any(one, axis=1))
-
-
-def _from_tips(body: Any, x: FloatArray) -> FloatArray:
-    """Distances of points (n, 3) from the nearest tip, L."""
-    tips = tips_of(body)[1]
-    if not len(tips):
-        return np.full(len(x), np.inf)
-    return np.asarray(np.min(np.linalg.norm(x[:, None] - tips, axis=2), axis=1))
+        return np.asarray(likely[((near & towards & (apart <= reach)) | ~np.isfinite(u1 + v1)) & ~np.any(one, axis=1)])
 
 
 def parted(body: Any, x: FloatArray, other: FloatArray, spreading: FloatArray, spacing: FloatArray) -> BoolArray:
@@ -172,13 +146,6 @@ def _bilinear(c: FloatArray, u: FloatArray, v: FloatArray) -> tuple[FloatArray, 
     low, high = c[:, 0, 0] + v * (c[:, 0, 1] - c[:, 0, 0]), c[:, 1, 0] + v * (c[:, 1, 1] - c[:, 1, 0])
     along = (1 - u) * (c[:, 0, 1] - c[:, 0, 0]) + u * (c[:, 1, 1] - c[:, 1, 0])
     return low + u * (high - low), high - low, along
-
-
-class Beyond(NamedTuple):
-    """Points of rays beyond their ends: the incidence of each ray (rays,), and (rays, SAMPLES) points."""
-
-    incidence: IntArray
-    points: RayPoints
 
 
 class RayEnds:
@@ -229,8 +196,8 @@ class RayEnds:
                 out[some] = np.max(np.where(near, amplitude[there], 0.0), axis=1, initial=0.0)
         return out
 
-    def _traced_on(self, late: BoolArray) -> Beyond:
-        """Some rays beyond their ends, each traced once."""
+    def _traced_on(self, late: BoolArray) -> tuple[IntArray, RayPoints]:
+        """Incidences of some rays (rays,), and (rays, SAMPLES) points beyond their ends, each ray traced once."""
         place, points = self._traced
         new = np.flatnonzero(late & (place < 0))
         if len(new):
@@ -246,7 +213,7 @@ class RayEnds:
             self._traced = place, points
         assert points is not None
         rows = place[late]
-        return Beyond(self._incidence[late], points[rows[:, None] * SAMPLES + np.arange(SAMPLES)])
+        return self._incidence[late], points[rows[:, None] * SAMPLES + np.arange(SAMPLES)]
 
 
 def _attenuation(body: Surface, states: FloatArray, times: FloatArray) -> FloatArray:

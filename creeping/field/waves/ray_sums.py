@@ -129,29 +129,46 @@ def ray_sum(
     size = magnitude(waves, rays.time) if size is None else size
     values = total_of(waves, observer, count)
     strength = total_of(size, observer, count)
-    decay, end = fan_decay(fan, wavenumber, boundary)
-    xi = fock_parameter(rays, wavenumber)
     # a wave may be infinite
     with np.errstate(invalid="ignore", over="ignore"):
-        lost = total_of(np.where(size > 0, size * np.exp(-decay * np.maximum(end - xi, 0.0)), 0.0), observer, count)
         merging = merging_error(shed, size, wavenumber, count)
         bent = np.minimum(fold_share(fan_strips(fan), shed, wavenumber), 1.0)
         folded = total_of(np.where(size > 0, size * bent, 0.0), observer, count)
         root = total_of(np.where(size > 0, size**2 * bent, 0.0), observer, count)
         narrow = (size > 0) & (tube_share(rays, shed.reach) * fock_scale(wavenumber, rays.curvature[1]) < NARROW)
         caustic = (merging > 0.04 * strength) | (folded > 0.008 * strength)
-        error = np.sqrt(total_of(own_error, observer, count) ** 2 + root + merging**2 + lost**2)
+        error = np.sqrt(total_of(own_error, observer, count) ** 2 + root + merging**2)
     caustic[observer[narrow]] = True
     ended = np.zeros(count, dtype=bool)
     ended[observer[~rays.alive]] = True
+    return judged_sum(fan, shed, size, values, error, (ended, caustic), wavenumber, boundary)
+
+
+def judged_sum(
+    fan: RayFan,
+    shed: ShedRays,
+    size: FloatArray,
+    values: ComplexArray,
+    error: FloatArray,
+    trouble: tuple[BoolArray, BoolArray],
+    wavenumber: float,
+    boundary: Boundary,
+) -> RaySum:
+    """A sum (n, ...) of waves of these sizes (m,), with what ends with the fan, and its status.
+
+    ``trouble`` says where rays have ended, and where they merge on a caustic: (n,), (n,).
+    """
+    observer, count = shed.observer, len(values)
+    strength = total_of(size, observer, count)
+    decay, end = fan_decay(fan, wavenumber, boundary)
+    xi = fock_parameter(shed.rays, wavenumber)
+    with np.errstate(invalid="ignore", over="ignore"):
+        lost = total_of(np.where(size > 0, size * np.exp(-decay * np.maximum(end - xi, 0.0)), 0.0), observer, count)
+        error = np.hypot(error, lost)
+    none = FieldStatus.TRUNCATED if np.exp(-decay * end) > FADED else FieldStatus.NO_RAY
     status = np.select(
-        [ended, strength == 0, caustic, lost > LOST * strength],
-        [
-            FieldStatus.DETACHED,
-            FieldStatus.TRUNCATED if np.exp(-decay * end) > FADED else FieldStatus.NO_RAY,
-            FieldStatus.CAUSTIC,
-            FieldStatus.TRUNCATED,
-        ],
+        [trouble[0], strength == 0, trouble[1], lost > LOST * strength],
+        [FieldStatus.DETACHED, none, FieldStatus.CAUSTIC, FieldStatus.TRUNCATED],
         FieldStatus.OK,
     )
     error = np.where(status == FieldStatus.OK, error, np.fmax(error, strength))
@@ -180,7 +197,9 @@ def own_error(
         ends = zip(scales(rays, wavenumber), rays.radius_rate, rays.radius_bend, strict=True)
         small, varying = np.mean([[m**-2, (np.abs(bend) + rate**2) / m**2] for m, rate, bend in ends], axis=0)
         if height is None:
-            across = _mean_across(rays, wavenumber)
+            # rho kappa_t/m^2, mean of both ends
+            pairs = zip(transverse_ratios(rays), scales(rays, wavenumber), strict=True)
+            across = np.mean([np.abs(r) / m**2 for r, m in pairs], axis=0)
             power = small if boundary.kind == "conductor" else across
             growing = np.hypot(of.varies * varying, of.across * across * power)
             growing = growing * np.maximum(fock_parameter(rays, wavenumber), LEAST_XI)
@@ -200,12 +219,6 @@ def magnitude(values: ComplexArray, like: Any) -> FloatArray:
     """|values| of the shape of ``like``: over axes beyond it, components, the root of the sum of squares."""
     size = np.abs(values)
     return np.asarray(size if size.ndim == np.ndim(like) else np.sqrt(np.sum(size**2, axis=-1)))
-
-
-def _mean_across(rays: RayPoints, wavenumber: float) -> FloatArray:
-    """rho kappa_t/m^2, mean of both ends (...)."""
-    ends = zip(transverse_ratios(rays), scales(rays, wavenumber), strict=True)
-    return np.asarray(np.mean([np.abs(r) / m**2 for r, m in ends], axis=0))
 
 
 def fold_share(strips: tuple[Strip, ...], shed: ShedRays, wavenumber: float) -> FloatArray:

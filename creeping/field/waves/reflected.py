@@ -62,7 +62,11 @@ def reflection(
             wave = (1 - 0.25 * across[curved] / along[curved] / m[curved] ** 2 * change) * wave
         out[curved] = -np.sqrt(-4 / xi) * np.exp(1j * xi**3 / 12) * wave
     if order == 2 and boundary.kind == "impedance":
-        out = out + _admittance_term(cosine, along, across, wavenumber, complex(boundary.admittance))
+        # what an admittance has at order 1/k beside P
+        eta = complex(boundary.admittance)
+        c = np.maximum(cosine, 0.0) + eta
+        term = 0.5j * eta / (wavenumber * c**2) * (across - (cosine - eta) / c * along)
+        out = out + limited(np.asarray(term, dtype=complex), LARGEST_TERM)
     return out
 
 
@@ -82,13 +86,6 @@ def _flat_reflection(
         slope = c / (c + eta) ** 2 if boundary.kind == "impedance" else first / c
         second = second - 1j * across / k * slope
     return np.asarray(first + limited(np.asarray(second, dtype=complex), LARGEST_TERM))
-
-
-def _admittance_term(cosine: FloatArray, along: FloatArray, across: FloatArray, k: float, eta: complex) -> ComplexArray:
-    """What R (n,) of an admittance has at order 1/k beside P."""
-    c = np.maximum(cosine, 0.0) + eta
-    term = 0.5j * eta / (k * c**2) * (across - (cosine - eta) / c * along)
-    return limited(np.asarray(term, dtype=complex), LARGEST_TERM)
 
 
 def plane_reflection(cosine: FloatArray, boundary: Boundary) -> ComplexArray:

@@ -27,6 +27,9 @@ What is left out is of the size τ⁴ e⁵/64 and (τ e²/4)², and where curvat
 Sources: [AS64, sec. 9.3]; Derivations, F4 to F7 and R19.
 """
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
 from creeping._typing import ComplexArray, FloatArray
@@ -163,16 +166,8 @@ def shed_wave(
     """
     share = np.broadcast_to(np.asarray(pole_share, dtype=float), rays.time.shape)
     if not np.all(rays.alive):
-        out = np.zeros(rays.time.shape, dtype=complex)
-        out[rays.alive] = shed_wave(
-            rays[rays.alive],
-            wavenumber,
-            boundary,
-            order,
-            transverse_weight=transverse_weight,
-            pole_share=share[rays.alive],
-        )
-        return out
+        more = partial(shed_wave, transverse_weight=transverse_weight, pole_share=share[rays.alive])
+        return of_alive(rays, lambda some: more(some, wavenumber, boundary, order))
     m1, m2 = scales(rays, wavenumber)
     xi = fock_parameter(rays, wavenumber)
     q = boundary.q(np.sqrt(m1 * m2))
@@ -193,6 +188,13 @@ def shed_wave(
             change += (1 - share[late]) * (pole(xi[late], 2) * squared + linear * pole(xi[late], 1))
             total[late] += weight[late] * change
     return np.asarray(np.exp(0.25j * np.pi) * total)
+
+
+def of_alive(rays: RayPoints, wave: Callable[[RayPoints], ComplexArray]) -> ComplexArray:
+    """A wave of rays (...), 0 where the creeping ray has ended."""
+    out = np.zeros(rays.time.shape, dtype=complex)
+    out[rays.alive] = wave(rays[rays.alive])
+    return out
 
 
 def shared_pole(xi: FloatArray, share: FloatArray, power: int = 0) -> ComplexArray:

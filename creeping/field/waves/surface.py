@@ -55,6 +55,7 @@ from creeping.field.waves.shed_wave import (
     limited,
     mode_waves,
     nearness,
+    of_alive,
     smoothstep,
 )
 from creeping.rays.quantities import RayPoints
@@ -80,9 +81,7 @@ def scalar_boundary(boundary: BoundaryLike) -> Boundary:
 def surface_waves(rays: RayPoints, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
     """Contribution of each ray at its point (...), u or du/dn in 1/L, 0 where the creeping ray has ended."""
     if not np.all(rays.alive):
-        out = np.zeros(rays.time.shape, dtype=complex)
-        out[rays.alive] = surface_waves(rays[rays.alive], wavenumber, boundary, order)
-        return out
+        return of_alive(rays, lambda some: surface_waves(some, wavenumber, boundary, order))
     m2 = scales(rays, wavenumber)[1]
     wave = _first_order(rays, wavenumber, boundary)
     if order == 2:
@@ -217,9 +216,7 @@ HARD_BY = 0.04
 def shed_waves(rays: RayPoints, reach: FloatArray, wavenumber: float, boundary: Boundary, order: int) -> ComplexArray:
     """Contribution of each ray (n,) to u at l = reach (n,), L, along its tangent; 0 where the ray has ended."""
     if not np.all(rays.alive):
-        out = np.zeros(rays.time.shape, dtype=complex)
-        out[rays.alive] = shed_waves(rays[rays.alive], reach[rays.alive], wavenumber, boundary, order)
-        return out
+        return of_alive(rays, lambda some: shed_waves(some, reach[rays.alive], wavenumber, boundary, order))
     m1, m2 = scales(rays, wavenumber)
     J, rate = rays.spreading, rays.spreading_rate
     tube = J + reach * rate

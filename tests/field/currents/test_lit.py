@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from creeping.field.boundary import HARD, SOFT, Boundary
-from creeping.field.currents.lit import lit_currents
+from creeping.field.currents.lit import Ground, lit_currents
 from tests.reference import section, sphere
 
 # largest error as a share of the largest current, by k: about one and a half times what is reached
@@ -18,7 +18,7 @@ BOUNDARIES = {
 
 def of_the_sphere(kind, given, k, c):
     one = np.ones_like(c)
-    mine = lit_currents(c, one, one, *np.zeros((3, len(c))), k, kind) * np.exp(-1j * k * c)
+    mine = lit_currents(Ground(c, one, one, *np.zeros((3, len(c)))), k, kind) * np.exp(-1j * k * c)
     exact = (sphere.surface_derivative if given == "soft" else sphere.surface_field)(k, 1.0, -c, given)
     return mine, exact
 
@@ -52,7 +52,7 @@ def test_cylinder(name):
     c = -np.cos(phi)
     one = np.ones_like(c)
     for k, limit in limits.items():
-        mine = lit_currents(c, one, *np.zeros((4, len(c))), k, kind) * np.exp(-1j * k * c)
+        mine = lit_currents(Ground(c, one, *np.zeros((4, len(c)))), k, kind) * np.exp(-1j * k * c)
         exact = (section.surface_derivative if name == "soft" else section.surface_field)(k, 1.0, phi, given)
         assert np.max(np.abs(mine - exact)) < limit * np.max(np.abs(exact))
 
@@ -63,7 +63,7 @@ def test_what_varying_curvature_adds_falls_off_towards_the_light(kind):
     k, c = 1e6, np.array([0.1, 0.2])
     one = np.ones_like(c)
     plain, *varied = (
-        lit_currents(c, one, one, twist * one, rate * one, bend * one, k, kind)
+        lit_currents(Ground(c, one, one, twist * one, rate * one, bend * one), k, kind)
         for twist, rate, bend in ((0, 0, 0), (0, 1, 0), (0, 0, 1), (0, 2, 3), (1, 0, 0))
     )
     m = np.cbrt(k / 2)
@@ -75,14 +75,16 @@ def test_what_varying_curvature_adds_falls_off_towards_the_light(kind):
 def test_soft_is_the_limit_of_a_large_admittance():
     c, one = np.linspace(0.05, 1, 40), np.ones(40)
     k, eta = 30.0, 1e5
-    u = lit_currents(c, one, one, *np.zeros((3, len(c))), k, Boundary("impedance", eta))
-    slope = lit_currents(c, one, one, *np.zeros((3, len(c))), k, SOFT)
+    u = lit_currents(Ground(c, one, one, *np.zeros((3, len(c)))), k, Boundary("impedance", eta))
+    slope = lit_currents(Ground(c, one, one, *np.zeros((3, len(c)))), k, SOFT)
     np.testing.assert_allclose(-1j * k * eta * u, slope, rtol=2e-3)
 
 
 def test_hard_is_the_limit_of_a_small_one():
     c, one = np.linspace(0.0, 1, 40), np.ones(40)
-    mine = [lit_currents(c, one, one, *np.zeros((3, len(c))), 30.0, b) for b in (Boundary("impedance", 1e-7), HARD)]
+    mine = [
+        lit_currents(Ground(c, one, one, *np.zeros((3, len(c)))), 30.0, b) for b in (Boundary("impedance", 1e-7), HARD)
+    ]
     np.testing.assert_allclose(*mine, atol=1e-5)
 
 
@@ -90,6 +92,6 @@ def test_concave_and_flat_regions_are_of_optics():
     k, c = 20.0, np.array([0.7, 0.9])
     for along in (0.0, -0.5):
         kappa = np.full(2, along)
-        u = lit_currents(c, kappa, kappa, *np.zeros((3, len(c))), k, HARD)
+        u = lit_currents(Ground(c, kappa, kappa, *np.zeros((3, len(c)))), k, HARD)
         z = 1j * kappa * (1 / c**2 + 1) / (2 * k * c)
         np.testing.assert_allclose(u, 2 * (1 - z), rtol=2e-3)

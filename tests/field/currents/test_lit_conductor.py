@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from creeping.field.boundary import HARD, SOFT
-from creeping.field.currents.lit import lit_conductor, lit_currents
+from creeping.field.currents.lit import Ground, lit_conductor, lit_currents
 from tests.reference import section, sphere
 
 NOTHING = np.zeros(80)
@@ -14,7 +14,7 @@ def on_the_sphere(k, order=2):
     """Errors of J_a for h and of J_b for e, shares of 2, at c (80,)."""
     c = np.linspace(0, 1, 80)
     one = np.ones(80)
-    mine = lit_conductor(c, one, one, NOTHING, NOTHING, NOTHING, k, order) * np.exp(-1j * k * c)[:, None, None]
+    mine = lit_conductor(Ground(c, one, one, NOTHING, NOTHING, NOTHING), k, order) * np.exp(-1j * k * c)[:, None, None]
     across, along = sphere.pec_surface_field(k, 1.0, -c)
     # at phi = 90 degrees a is -theta, b is +x, the way of E0, and J_b = -H_theta; at 0 h is -1 and J_a = H_phi
     return np.abs([mine[:, 0, 0] + along, mine[:, 1, 1] + across]) / 2
@@ -58,11 +58,11 @@ def test_scalar_currents_of_a_cylinder_met_obliquely(kind):
     s = np.sin(gamma)
     of = section.surface_field if kind == HARD else section.surface_derivative
     exact = of(k * s, 1.0, phi, kind.kind) * np.exp(-1j * k * s * np.cos(phi))
-    off = np.abs(lit_currents(*geometry, k, kind) - exact) / np.abs(exact).max()
+    off = np.abs(lit_currents(Ground(*geometry), k, kind) - exact) / np.abs(exact).max()
     assert off.max() < 1e-4
     plain = list(geometry)
     plain[3] = 0 * phi
-    assert np.max(np.abs(lit_currents(*plain, k, kind) - exact)) > 4 * off.max() * np.abs(exact).max()
+    assert np.max(np.abs(lit_currents(Ground(*plain), k, kind) - exact)) > 4 * off.max() * np.abs(exact).max()
 
 
 def exact_on_the_cylinder(k, gamma, phi, geometry):
@@ -85,12 +85,12 @@ def test_cylinder_met_obliquely(gamma):
     # both polarisations, and what each gives to the other, which is of order 1/m of the soft one
     phi, geometry = on_the_cylinder(gamma)
     for k, limit in ((40.0, 0.012), (320.0, 2e-3)):
-        off = np.abs(lit_conductor(*geometry, k) - exact_on_the_cylinder(k, gamma, phi, geometry)) / 2
+        off = np.abs(lit_conductor(Ground(*geometry), k) - exact_on_the_cylinder(k, gamma, phi, geometry)) / 2
         assert off.max() < limit
 
 
 def test_optics_take_over_on_flat_ground():
     # J = 2 n x H, whatever the plane of incidence
     c, none = np.array([0.3, 0.9]), np.zeros(2)
-    J = lit_conductor(c, none, none, none, none, none, 10.0)
+    J = lit_conductor(Ground(c, none, none, none, none, none), 10.0)
     np.testing.assert_allclose(J, [[[-2, 0], [0, 2 * x]] for x in c], atol=1e-12)

@@ -77,6 +77,16 @@ def shadow_point(section: Section, direction: FloatArray, sense: int) -> float:
     return float(np.mod(high, section.length))
 
 
+def plane_rays(s: FloatArray, curvature: FloatArray, **more: Any) -> RayProfiles:
+    """Rays in planes, J = 1 on them, and the incident wave that of their curves, unless more is given."""
+    none = np.zeros(s.shape)
+    names = "transverse", "torsion", "lean", "potential", "phase", "climb"
+    given = dict.fromkeys(names, none) | {"spreading": none + 1} | more
+    found = RayProfiles(s, curvature, **given)
+    own = {"phase": found.curves[..., 1] - s, "climb": np.sin(found.curves[..., 0])}
+    return replace(found, **{name: values for name, values in own.items() if name not in more})
+
+
 def section_profile(section: Section, shadow: float, sense: int, length: float) -> RayProfiles:
     """Profile of the way along a section from half its circumference before the shadow point on."""
     begin, total = -section.length / 2, section.length
@@ -96,7 +106,7 @@ def section_profile(section: Section, shadow: float, sense: int, length: float) 
         inside = np.clip(nodes, low + 1e-7 * total * bool(len(inner)), high - 1e-7 * total * bool(len(inner)))
         s.append(nodes)
         kappa.append(section.at(shadow + sense * inside).curvature)
-    return RayProfiles(s=np.concatenate(s)[None], curvature=np.concatenate(kappa)[None])
+    return plane_rays(np.concatenate(s)[None], np.concatenate(kappa)[None])
 
 
 def section_waves(
@@ -117,7 +127,7 @@ def section_waves(
         shadow = shadow_point(section, direction, sense)
         profile = section_profile(section, shadow, sense, share * section.length)
         if admittance is not None:
-            profile = replace(profile, admittance=admittance(shadow + sense * profile.s))
+            profile = replace(profile, admittance=np.asarray(admittance(shadow + sense * profile.s), dtype=complex))
         marched = march_rays(profile, wavenumber=wavenumber, boundary=BOUNDARIES[boundary])
         at = section.at(np.array([shadow])).points[0]
         waves.append(SectionWave(marched, shadow, sense, complex(np.exp(1j * wavenumber * (at @ direction)))))

@@ -6,7 +6,7 @@ from scipy.special import h1vp, hankel1
 
 from creeping.field.boundary import HARD, SOFT
 from creeping.field.marching.layer import march_rays
-from creeping.field.marching.profile import RayProfiles
+from tests.field.marching.section_waves import plane_rays
 
 
 def helix(angle):
@@ -15,9 +15,9 @@ def helix(angle):
     s = np.linspace(-1.45, 6.0, 500) / across
     s[np.argmin(np.abs(s))] = 0.0
     theta, one = s * across, np.ones((1, len(s)))
-    return RayProfiles(
-        s=s[None],
-        curvature=across**2 * one,
+    return plane_rays(
+        s[None],
+        across**2 * one,
         transverse=along**2 * one,
         torsion=-along * across * one,
         lean=-along / across * one,
