@@ -33,7 +33,7 @@ from creeping.field.equation.solution import Solution
 from creeping.geodesics.equations import points_of_charts
 from creeping.geometry.directions import unit_directions
 from creeping.geometry.piecewise import is_piecewise
-from creeping.geometry.surface import Surface, memo, memo_of
+from creeping.geometry.surface import Surface, memo
 from creeping.storage.parts import Keeping, not_kept
 
 KEPT = 6
@@ -120,13 +120,14 @@ def _solved(
     keep: Keeping = not_kept,
 ) -> Solution:
     kind = equation_boundary(boundary)
-
-    def make() -> Matrix:
-        return Matrix(body_tiles(body, wavenumber, kind, coarse=effort.coarse), wavenumber, kind)
-
-    # incidences one by one come with the same matrix
-    matrix = memo_of(body, "matrix of the equation", (wavenumber, boundary, effort.coarse), make, 1)
-    return Solution(body, directions, wavenumber, boundary, kind, matrix, tell, effort, keep)
+    # incidences one by one come with the same matrix; solutions that are kept do not keep the blocks of others
+    made: dict[tuple[float, BoundaryLike, bool], Matrix] = memo(body, "matrix of the equation", dict)
+    key = wavenumber, boundary, effort.coarse
+    if key not in made:
+        while made:
+            made.popitem()[1].products.clear()
+        made[key] = Matrix(body_tiles(body, wavenumber, kind, coarse=effort.coarse), wavenumber, kind)
+    return Solution(body, directions, wavenumber, boundary, kind, made[key], tell, effort, keep)
 
 
 class Solved(NamedTuple):

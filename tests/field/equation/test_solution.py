@@ -227,6 +227,8 @@ def test_the_matrix_stays_for_incidences_to_come(monkeypatch):
         for body, d in zip([bodies[0], bodies[0], bodies[1]], [(1, 0, 0), (0, 0.6, 0.8), (0, 0.6, 0.8)], strict=True)
     )
     assert len(made) == 2 and second == alone and second != first
-    # another wavenumber is another matrix
+    # another wavenumber is another matrix, and the first one's blocks go, though its solution stays
+    kept = cr.solve(bodies[0], (1, 0, 0), wavenumber=3.0, boundary="hard")
+    assert len(made) == 2 and kept._matrix.products
     cr.solve(bodies[0], (1, 0, 0), wavenumber=3.1, boundary="hard")
-    assert len(made) == 3
+    assert len(made) == 3 and not kept._matrix.products
