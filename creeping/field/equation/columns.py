@@ -97,7 +97,8 @@ def solved_columns(
     right = (right * matrix.root[:, None, None]).reshape(nodes * c, -1)
     n, columns = right.shape
     mirrors = mirrors_of(matrix.tiles, matrix.boundary)
-    dense = is_dense(nodes, matrix.boundary, len(mirrors.images))
+    # blocks that are there serve, however little memory is free by now
+    dense = bool(matrix.products) or is_dense(nodes, matrix.boundary, len(mirrors.images))
     if not dense:
         mirrors = no_mirrors(nodes, c)
     parts = len(mirrors.images)

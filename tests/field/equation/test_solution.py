@@ -232,3 +232,12 @@ def test_the_matrix_stays_for_incidences_to_come(monkeypatch):
     assert len(made) == 2 and kept._matrix.products
     cr.solve(bodies[0], (1, 0, 0), wavenumber=3.1, boundary="hard")
     assert len(made) == 3 and not kept._matrix.products
+
+
+def test_blocks_that_are_there_serve_when_memory_has_become_short(monkeypatch):
+    """They are of parities, which sums over all nodes know nothing of."""
+    body, asked = sc.Ellipsoid(1.0, 0.8, 0.6), {"wavenumber": 3.0, "boundary": "hard"}
+    alone = cr.solve(sc.Ellipsoid(1.0, 0.8, 0.6), (0, 0.6, 0.8), **asked).backscatter().total
+    cr.solve(body, (1, 0, 0), **asked)
+    monkeypatch.setattr(columns, "is_dense", lambda *_: False)
+    assert cr.solve(body, (0, 0.6, 0.8), **asked).backscatter().total == alone
