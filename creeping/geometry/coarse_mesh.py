@@ -50,20 +50,24 @@ class CoarseMesh(NamedTuple):
 def coarse_meshes(body: Any) -> Iterator[CoarseMesh | SurfaceError]:
     """Coarse meshes of a body, the coarsest first, or why one is none."""
     smooth = not is_piecewise(body)
-    try:
-        kind = _of_cells(body, CELLS[-1]).kind if smooth else 0
-    except SurfaceError as error:
-        yield error
-        return
-    for step in CELLS if smooth else SIDES_OF_PIECES:
+    finest: CoarseMesh | None = None
+    if smooth:
+        try:
+            finest = _of_cells(body, CELLS[-1])
+        except SurfaceError as error:
+            yield error
+            return
+    for step in CELLS[:-1] if smooth else SIDES_OF_PIECES:
         try:
             mesh = _of_cells(body, int(step)) if smooth else _of_pieces(body, step * size(body))
         except (SurfaceError, ValueError) as error:
             yield error if isinstance(error, SurfaceError) else SurfaceError(str(error))
             continue
         # a thin body may pass between the points of a coarse grid
-        if not smooth or mesh.kind == kind:
+        if finest is None or mesh.kind == finest.kind:
             yield mesh
+    if finest is not None:
+        yield finest
 
 
 def _of_cells(body: Surface, cells: int) -> CoarseMesh:
