@@ -193,18 +193,16 @@ def mirrored(cloud: PointCloud, fine: Fitted, coarse: Fitted) -> tuple[Fitted, F
     level = fine.spline.level(cloud.points)
     doubt = coarse.spline.level(cloud.points) - level
     for axis in range(3):
-        images = [replace(one.spline, coefficients=np.flip(one.spline.coefficients, axis)) for one in (fine, coarse)]
-        off = images[0].level(cloud.points) - level
+        off = replace(fine.spline, coefficients=np.flip(fine.spline.coefficients, axis)).level(cloud.points) - level
         if rms(off) <= rms(doubt) and np.max(np.abs(off)) <= np.max(np.abs(doubt)):
-            fine, coarse = (
-                _remeasured(cloud, one, 0.5 * (one.spline.coefficients + image.coefficients))
-                for one, image in zip((fine, coarse), images, strict=True)
-            )
+            fine, coarse = _symmetric(cloud, fine, axis), _symmetric(cloud, coarse, axis)
     return fine, coarse
 
 
-def _remeasured(cloud: PointCloud, fitted: Fitted, coefficients: FloatArray) -> Fitted:
-    spline = replace(fitted.spline, coefficients=coefficients)
+def _symmetric(cloud: PointCloud, fitted: Fitted, axis: int) -> Fitted:
+    """The mean of a fit and its image along an axis, and what it leaves at the points."""
+    c = fitted.spline.coefficients
+    spline = replace(fitted.spline, coefficients=0.5 * (c + np.flip(c, axis)))
     misfit, turn = left_at(spline, cloud.points, cloud.normals)
     return replace(fitted, spline=spline, misfit=misfit, turn=turn)
 
