@@ -32,9 +32,9 @@ from creeping.storage.parts import Arrays, Keeping, not_kept
 TOGETHER = 5e8
 """Bytes of what GMRES keeps of right sides that are solved together."""
 DENSE, SHARE, HELD = 4e9, 0.7, 0.125
-"""Bytes of a scalar matrix that is kept at most: beyond, a product of one column takes longer than its sums; and share
-of the memory's budget, up to which the matrix of a conductor is sooner, and up to which it stays for incidences to
-come: half as large a share of what is free."""
+"""Bytes of a scalar matrix that is kept at most: beyond, a product of one column takes longer than its sums. Shares of
+the memory's budget: up to the first the matrix of a conductor is sooner than sums; up to the second the matrix stays
+with its body for incidences to come, so that most of the budget is left for what is asked for next."""
 
 TOLERANCE, COARSE_TOLERANCE, STEPS = 3e-5, 3e-3, 80
 """Residual of the equation relative to its right side, and most steps. Coarse tiles err by 0.03 % of the largest
