@@ -300,7 +300,7 @@ DEATHS = {
     "says why": ("echo 'Error: no faces' >&2; exit 3", "cannot read or mesh it .Error: no faces."),
     "writes nothing": ("exit 0", "it ended with code 0"),
     "library": (f"echo '{LIBRARY}' >&2; exit 1", "gmsh does not start: OSError: libGLU.*; on Debian: apt install lib"),
-    "hangs": ("exec sleep 60", r"torus.step: gmsh did not mesh it within 0.2 s; simplify the body"),
+    "hangs": ("exec sleep 60", r"torus.step: gmsh did not mesh it within 0.2 s; mend or simplify it"),
 }
 
 
