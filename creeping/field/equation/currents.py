@@ -49,10 +49,10 @@ THIN = (DEPTH, SHALLOW, 0.05, 0.02, 0.005)
 """Least depths, in wavelengths, of points inside, the next where the body is too thin for one."""
 DEEPEST = 50
 """Points inside a body that is thinner everywhere."""
-ON_BODY, OFF_BODY = 10.0, 2.0
+ON_BODY, OFF_BODY = 10.0, 3.0
 """Error of currents at a point and of the field next to the body, and of that far from it, by what they leave inside;
 series judge them at each height (`tests.field.equation.test_solution`)."""
-LEAST, LEAST_NEAR = 2e-5, 5e-5
+LEAST, LEAST_NEAR = 1e-5, 2.5e-5
 """What is left inside, at least, for the far field, where errors of tiles cancel, and on the body and near it: a few
 times what is left of the equation and what integrals over tiles err by (`studies.accuracy.edges`)."""
 CHANGED = 2.0
@@ -177,14 +177,16 @@ class _OnTiles(SurfaceCurrents):
     def _error_on(self, places: Places, nodes: ComplexArray, values: ComplexArray, unit: float) -> FloatArray:
         """Error of values that the equation gives at places (m, ...): (m,), of a conductor (m, p).
 
-        What polynomials do not resolve changes sign across a tile: where the surface curves little its integral is
-        small; across an edge it is not.
+        What polynomials do not resolve changes sign across a tile, about as e^(iqs) with 1/q = w/(2p + 1), w its width:
+        where the surface curves little its double layer is small, across an edge it is not, and an impedance adds its
+        single layer, which on a plane is k|eta|/q times it.
         """
         assert places.own is not None
         tiles, (tile, u, v) = self.matrix.tiles, places.own
         from_edge = tiles.from_edge(tile, u, v)
         away = from_edge * gauss(tiles.p)[0][0] * tiles.widths[tile]
         share = np.minimum(1.0, SMOOTHED + 1 / (1 + (away / tiles.reach[tile]) ** 2))
+        share += np.abs(self.boundary.at(places.points).admittance) * self.wavenumber * tiles.reach[tile]
         unresolved = (share * self._unresolved(places, nodes, values).T).T
         error = np.hypot(ON_BODY * unit * np.maximum(self._left, LEAST), unresolved)
         if self.boundary.kind in ("soft", "conductor"):

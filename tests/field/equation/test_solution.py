@@ -25,20 +25,19 @@ def flat():
     return cr.solve(CYLINDER, np.concatenate([d, -d]), wavenumber=3.0, boundary="hard")
 
 
-@pytest.mark.parametrize("boundary", ["soft", "hard"])
+@pytest.mark.parametrize("boundary", ["soft", "hard", cr.ImpedanceBoundary(ETA)])
 def test_stated_errors_at_each_height_are_those_of_the_series(boundary, rng):
     """k = 10, where tiles are as wide as they are for any larger k."""
     k, d = 10.0, D[1]
     found = cr.solve(sc.Sphere(), d, wavenumber=k, boundary=boundary)
     n = rng.normal(size=(60, 3))
     n /= np.linalg.norm(n, axis=1, keepdims=True)
-    if boundary == "soft":
-        fields = [(found.surface_field(n), sphere.surface_derivative(k, 1.0, n @ d, "soft"))]
-    else:
-        fields = [(found.surface_field(n), sphere.surface_field(k, 1.0, n @ d, "hard"))]
+    known = ETA if isinstance(boundary, cr.ImpedanceBoundary) else boundary
+    series = sphere.surface_derivative if boundary == "soft" else sphere.surface_field
+    fields = [(found.surface_field(n), series(k, 1.0, n @ d, known))]
     for height in (1e-3, 0.03, 0.1, 0.3, 1.0, 3.0):
         x = (1 + height) * n
-        fields.append((found.near_field(x), sphere.total_field(k, 1.0, x, d, boundary)))
+        fields.append((found.near_field(x), sphere.total_field(k, 1.0, x, d, known)))
     for field, exact in fields:
         off = np.abs(field.values - exact)
         assert np.mean(off <= field.error) > 0.95
