@@ -20,6 +20,7 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
+import creeping
 import studies
 from creeping import CreepingError
 from creeping._version import __version__
@@ -159,6 +160,7 @@ def gather(sources: Path, cards: list[dict[str, Any]], figures: Path) -> None:
     """Write what Sphinx reads: pages, notebooks, gallery, pictures, thumbnails and the style."""
     shutil.copytree(PAGES, sources)
     shutil.copytree(NOTEBOOKS, sources / "notebooks")
+    shutil.copy(Path(creeping.__file__).with_name("references.bib"), sources)
     for name in ("gallery/thumbs", "figures", "style"):
         (sources / name).mkdir(parents=True)
     (sources / "style" / "custom.css").write_text(STYLE, encoding="utf-8")
