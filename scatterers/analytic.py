@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from creeping._typing import FloatArray
-from scatterers.body import Body, Levelled, SphereMapped, cached, finite, polar_angles, positive
+from scatterers.body import Body, Levelled, SphereMapped, cached, polar_angles
 from scatterers.charts.star import CubeSphereAtlas, FaceChart, PeriodicAtlas, PeriodicChart
 from scatterers.kernels.charts import cos_pi, cube_tangents, fill_frame, sin_pi
 from scatterers.kernels.compiled import Compiled, Kind
@@ -117,10 +117,6 @@ class Ellipsoid(BentEllipsoid):
     c: float
     speed: Any = None
 
-    def __post_init__(self) -> None:
-        positive(a=self.a, b=self.b, c=self.c)
-        self._set_speed()
-
     def _shape(self) -> tuple[float, float, float, float]:
         return self.a, self.b, self.c, 0.0
 
@@ -154,10 +150,6 @@ class Sphere(BentEllipsoid):
 
     radius: float = 1.0
     speed: Any = None
-
-    def __post_init__(self) -> None:
-        positive(radius=self.radius)
-        self._set_speed()
 
     def _shape(self) -> tuple[float, float, float, float]:
         return self.radius, self.radius, self.radius, 0.0
@@ -197,10 +189,7 @@ class TwistedEllipsoid(BentEllipsoid):
     d: float = 0.2
     speed: Any = None
 
-    def __post_init__(self) -> None:
-        positive(a=self.a, b=self.b, c=self.c)
-        finite(d=self.d)
-        self._set_speed()
+    _free = ("d",)
 
     def _shape(self) -> tuple[float, float, float, float]:
         return self.a, self.b, self.c, self.d
@@ -328,10 +317,9 @@ class Torus(Levelled, Body):
     speed: Any = None
 
     def __post_init__(self) -> None:
-        positive(R=self.R, r=self.r)
+        super().__post_init__()
         if self.r >= self.R:
             raise ValueError(f"r = {self.r!r} >= R = {self.R!r}: the torus meets itself; give r < R")
-        self._set_speed()
 
     @cached
     def bounds(self) -> FloatArray:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence, Sized
 from dataclasses import dataclass, fields
 from functools import cached_property
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -201,6 +201,15 @@ class Body(Shown):
     def tiling(self) -> Sequence[Any]:
         """Charts whose unit squares cover the body once and meet along their sides; empty if there are none."""
         return ()
+
+    # fields that need not be positive, or may be left out
+    _free: ClassVar[tuple[str, ...]] = ()
+
+    def __post_init__(self) -> None:
+        given = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "speed"}  # type: ignore[arg-type]
+        finite(**{name: given.pop(name) for name in self._free if given[name] is not None})
+        positive(**{name: value for name, value in given.items() if name not in self._free})
+        self._set_speed()
 
     def _set_speed(self) -> None:
         object.__setattr__(self, "speed", as_speed(getattr(self, "speed", None)))

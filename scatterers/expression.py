@@ -153,18 +153,6 @@ class Differentiated(NamedTuple):
     first: Callable[..., tuple[float, float, float, float]]
 
 
-def one_sided(text: str) -> str:
-    """An equation as the expression that is 0 on it, left minus right; other texts as they are.
-
-    Examples
-    --------
-    >>> one_sided("x**2 + y**2 + z**2 = 1")
-    '(x**2 + y**2 + z**2) - (1)'
-    """
-    sides = re.split("(?<![<>=!])={1,2}(?!=)", text) if isinstance(text, str) else []
-    return f"({sides[0].strip()}) - ({sides[1].strip()})" if len(sides) == 2 else text
-
-
 def parse(text: str) -> Any:
     """Turn the text into a sympy expression of x, y, z.
 
@@ -375,7 +363,11 @@ def derivatives(expression: Any, text: str) -> Differentiated:
         *(f"        {symbol} = {printer.doprint(part)}" for symbol, part in shared),
         *(f"        {target} = {printer.doprint(part)}" for target, part in zip(targets, reduced, strict=True)),
     ]
-    operations = _operations(lines)
+    # floating-point operations of printed code, about; see `scatterers.kernels.compiled.Compiled`
+    text = "\n".join(lines)
+    called = len(re.findall(rf"\b(?:{'|'.join(FUNCTIONS)})\(", text))
+    # operations that a call of a function is worth
+    operations = float(100 * called + len(re.findall(r" [+/-] |\*", text)))
     slopes, of_slopes = _shared([expression, *gradient])
     lines += [
         "def first(x, y, z, parameters):",
@@ -406,11 +398,3 @@ def _size(expression: Any) -> int:
     variables = len(expression.free_symbols)
     first, second = orders(expression)
     return variables * first + variables * (variables + 1) // 2 * second
-
-
-def _operations(lines: list[str]) -> float:
-    """Floating-point operations of printed code, about; see `scatterers.kernels.compiled.Compiled`."""
-    text = "\n".join(lines)
-    called = len(re.findall(rf"\b(?:{'|'.join(FUNCTIONS)})\(", text))
-    # operations that a call of a function is worth
-    return float(100 * called + len(re.findall(r" [+/-] |\*", text)))

@@ -11,6 +11,7 @@ Sources: [B78]; Derivations, B7.
 """
 
 import hashlib
+import re
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
@@ -33,13 +34,11 @@ from scatterers.exact.singularities import (
     kinks,
     polished,
     refuse_edges,
-    refuse_kinks,
     samples_of,
     singular_points,
     tightened,
 )
 from scatterers.exact.switches import ExpressionSpace, Switches
-from scatterers.expression import one_sided
 from scatterers.fits.tensor import TensorSpline, coefficients
 
 
@@ -91,7 +90,9 @@ class Implicit(LevelBody):
         strict: bool = False,
         speed: Any = None,
     ) -> None:
-        expression = one_sided(expression)
+        # an equation as the expression that is 0 on it, left minus right; other texts as they are
+        sides = re.split("(?<![<>=!])={1,2}(?!=)", expression) if isinstance(expression, str) else []
+        expression = f"({sides[0].strip()}) - ({sides[1].strip()})" if len(sides) == 2 else expression
         everywhere = ExpressionSpace(expression, np.array([[-SIZES[-1]] * 3, [SIZES[-1]] * 3]))
         self.expression = expression
         self.speed = speed
@@ -105,7 +106,11 @@ class Implicit(LevelBody):
             samples = samples_of(everywhere, box, FINE)
             examine(expression, samples, True)
         given = None if centre is None else numbers_of("centre", centre, (3,))
-        self._shape(expression, samples, given)
+        space = ExpressionSpace(expression, np.stack([samples.origin, samples.far_corner]))
+        sphere_map, failure = star_map(space, samples, given)
+        if sphere_map is None and given is not None:
+            raise ValueError(failure)
+        self._place(space, samples, sphere_map)
         tips = self._tips(samples, strict)
         along = self._found_creases(samples, strict)
         ends = [int(self._numbers(tip[None])[0]) for tip in tips]
@@ -135,7 +140,12 @@ class Implicit(LevelBody):
             apart = np.array([polished(self.compiled, place, size) for place in apart]).reshape(-1, 3)
         tips = len(apart) <= 8 and all(is_tip(self.compiled, place, size) for place in apart)
         if not tips:
-            refuse_kinks(sharp, bends)
+            if len(sharp):
+                worst = tuple(sharp[np.argmax(bends)].round(6).tolist())
+                raise ValueError(
+                    f"F = 0 is not smooth: its curvature has no bound near {worst} "
+                    f"({len(sharp)} searches); an edge or a pole of F there: round it off in F"
+                )
         found = distinct(np.concatenate([flat, apart]), np.arange(len(flat) + len(apart), 0.0, -1.0), size)
         if strict and len(found):
             raise ValueError(
@@ -177,13 +187,6 @@ class Implicit(LevelBody):
         flat = np.asarray(points, dtype=float).reshape(-1, 3)
         found = self._switches.numbers(flat) if len(self._pieces) > 1 else np.zeros(len(flat), dtype=np.int64)
         return found.reshape(np.shape(points)[:-1])
-
-    def _shape(self, expression: str, samples: Samples, centre: FloatArray | None) -> None:
-        space = ExpressionSpace(expression, np.stack([samples.origin, samples.far_corner]))
-        sphere_map, failure = star_map(space, samples, centre)
-        if sphere_map is None and centre is not None:
-            raise ValueError(failure)
-        self._place(space, samples, sphere_map)
 
     def __repr__(self) -> str:
         return f"Implicit({self.expression!r}, speed={self.speed!r})"

@@ -44,7 +44,6 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
-from scatterers.body import finite, positive
 from scatterers.exact.profile import Arc, Line, Segment
 from scatterers.exact.revolved import Revolved
 
@@ -60,12 +59,11 @@ class Lengthy(Revolved):
     _least = 0.0
 
     def __post_init__(self) -> None:
-        positive(radius=self.radius, length=self.length)
+        super().__post_init__()
         if self.length <= self._least * self.radius:
             raise ValueError(
                 f"length = {self.length!r} is not more than twice the radius {self.radius!r}; it is that of the whole"
             )
-        self._set_speed()
 
 
 @dataclass(frozen=True)
@@ -135,12 +133,12 @@ class Cone(Revolved):
     top: float = 0.0
     speed: Any = None
 
+    _free = ("top",)
+
     def __post_init__(self) -> None:
-        positive(radius=self.radius, length=self.length)
-        finite(top=self.top)
+        super().__post_init__()
         if self.top < 0:
             raise ValueError(f"top = {self.top!r} is negative; give 0 for a tip, or a radius")
-        self._set_speed()
 
     @cached_property
     def _profile(self) -> Sequence[Segment]:
@@ -318,17 +316,16 @@ class DoubleOgive(Revolved):
     upper_angle: float | None = None
     speed: Any = None
 
+    _free = ("lower_angle", "upper_angle")
+
     def __post_init__(self) -> None:
-        positive(radius=self.radius, lower=self.lower, upper=self.upper)
+        super().__post_init__()
         for name in ("lower", "upper"):
-            if getattr(self, name) <= self.radius:
-                raise ValueError(f"{name} = {getattr(self, name)!r} is not more than the radius {self.radius!r}")
-            angle = getattr(self, f"{name}_angle")
-            if angle is not None:
-                finite(**{f"{name}_angle": angle})
-                if not 0 < angle < math.pi / 2:
-                    raise ValueError(f"{name}_angle = {angle!r} is not between 0 and pi/2; angles are radians")
-        self._set_speed()
+            length, angle = getattr(self, name), getattr(self, f"{name}_angle")
+            if length <= self.radius:
+                raise ValueError(f"{name} = {length!r} is not more than the radius {self.radius!r}")
+            if angle is not None and not 0 < angle < math.pi / 2:
+                raise ValueError(f"{name}_angle = {angle!r} is not between 0 and pi/2; angles are radians")
 
     def _shape_texts(self) -> list[str]:
         values = [self.radius, self.lower, self.upper, self.lower_angle, self.upper_angle]
@@ -390,10 +387,6 @@ class Almond(Revolved):
     # u, v, w are y, 3 z and x: it is three times as wide as thick
     _axes = (1, 2, 0)
     _stretch = 3.0
-
-    def __post_init__(self) -> None:
-        positive(length=self.length)
-        self._set_speed()
 
     @cached_property
     def _profile(self) -> Sequence[Segment]:

@@ -62,7 +62,7 @@ def torus_grid(n: int, minor: float = 0.5) -> Mesh:
 @cache
 def slivers(body: Any, cells: int) -> Mesh:
     """Surface nets on a grid: triangles of all shapes."""
-    found = triangulate(body.level, body.gradient, body.bounds, cells=cells)
+    found = triangulate(body, cells=cells)
     return found.vertices, found.triangles
 
 

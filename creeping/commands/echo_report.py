@@ -159,13 +159,6 @@ def write_results(
     return names, extra
 
 
-def _ranges(echo: Echo, body: Surface) -> tuple[float, float]:
-    """Ranges, metres, nine tenths of the diagonal of the body's box to both sides of its middle."""
-    d = -directions_from_azimuth_elevation(*np.radians((echo.azimuth[0], echo.elevation[0])))
-    middle, diagonal = float(np.mean(body.bounds, axis=0) @ d), float(np.linalg.norm(np.ptp(body.bounds, axis=0)))
-    return middle - 0.9 * diagonal, middle + 0.9 * diagonal
-
-
 def _profiles(echo: Echo) -> dict[str, RangeProfile]:
     """Range profiles by channel, of backscatter in one direction over a band of 16 or more equal steps, all finite."""
     if echo.incidence is not None or len(echo.azimuth) > 1 or len(echo.wavenumbers) < 16:
@@ -195,7 +188,10 @@ def _drawn(output: Path, echo: Echo, profiles: dict[str, RangeProfile], body: Su
     if several and not band:
         drawn(f"{echo.quantity}_polar.png", plotting.echo_picture, echo, kind="polar")
     if profiles:
-        drawn("range.png", plotting.range_picture, profiles, echo, _ranges(echo, body))
+        # ranges, metres, nine tenths of the diagonal of the body's box to both sides of its middle
+        d = -directions_from_azimuth_elevation(*np.radians((echo.azimuth[0], echo.elevation[0])))
+        middle, diagonal = float(np.mean(body.bounds, axis=0) @ d), float(np.linalg.norm(np.ptp(body.bounds, axis=0)))
+        drawn("range.png", plotting.range_picture, profiles, echo, (middle - 0.9 * diagonal, middle + 0.9 * diagonal))
     return names
 
 

@@ -62,7 +62,10 @@ def size_words(shape: Any, wavenumbers: ArrayLike, *, metres: bool, cure: str) -
         If no field is known of a body so small or large; ``cure`` says what to give.
     """
     k = np.atleast_1d(np.asarray(wavenumbers, dtype=float))
-    unit, side = "m" if metres else unit_of(shape), _longest(shape)
+    # longest side of the body, L: of its own points where its bounds are those of a grid about it
+    padded = any(hasattr(shape, name) for name in ("fit", "expression"))
+    points = points_of_charts(shape) if padded and not why_no_rays(shape) else np.asarray(shape.bounds, dtype=float)
+    unit, side = "m" if metres else unit_of(shape), float(np.max(np.ptp(points, axis=0)))
     ends = [side * float(end) / (2 * np.pi) for end in (k.min(), k.max())]
     told = " to ".join(dict.fromkeys(f"{end:.3g}" for end in ends))
     size = f"{side:.4g} {unit}, {told} wavelengths across"
@@ -74,13 +77,6 @@ def size_words(shape: Any, wavenumbers: ArrayLike, *, metres: bool, cure: str) -
     # a unit is asked about from a thousandth of 30 wavelengths, and from a thousand times 3
     doubt = "small" if ends[1] < 0.03 else "large" if ends[0] > 3e3 else ""
     return f"{size} (so {doubt}? {cure})" if doubt else size
-
-
-def _longest(shape: Any) -> float:
-    """Longest side of the body, L: of its own points where its bounds are those of a grid about it."""
-    padded = any(hasattr(shape, name) for name in ("fit", "expression"))
-    points = points_of_charts(shape) if padded and not why_no_rays(shape) else np.asarray(shape.bounds, dtype=float)
-    return float(np.max(np.ptp(points, axis=0)))
 
 
 def forecast(

@@ -190,7 +190,13 @@ class Job:
     def write(self, far: FarField, of: RayFan | Solution, output: Output) -> tuple[dict[str, Any], list[str]]:
         """Write the files of a far field; returns the entry of the summary and their names."""
         direction = of.line.direction if isinstance(of, RayFan) else of.directions[0]
-        names = self._tables(far, direction, output)
+        names = write_tables(output.folder / "far", output.formats, far, observed=self._observed, far=far)
+        for target, piece in zip(self.targets, self._pieces(far), strict=True):
+            # a .ffe file holds no infinity; the table does
+            if target.kind == "grid" and np.all(np.isfinite(piece.total)):
+                where = output.folder / "far.ffe"
+                files.write_ffe(where, piece, target.theta, target.phi, direction=direction)
+                names.append(where.name)
         if output.pictures:
             names += self._pictures(far, of, output)
         size = np.abs(far.total)
@@ -237,16 +243,6 @@ class Job:
         """The far field of each target."""
         ends = np.cumsum([len(target.directions) for target in self.targets])
         return [far.take(slice(end - len(t.directions), end)) for t, end in zip(self.targets, ends, strict=True)]
-
-    def _tables(self, far: FarField, direction: FloatArray, output: Output) -> list[str]:
-        names = write_tables(output.folder / "far", output.formats, far, observed=self._observed, far=far)
-        for target, piece in zip(self.targets, self._pieces(far), strict=True):
-            # a .ffe file holds no infinity; the table does
-            if target.kind == "grid" and np.all(np.isfinite(piece.total)):
-                where = output.folder / "far.ffe"
-                files.write_ffe(where, piece, target.theta, target.phi, direction=direction)
-                names.append(where.name)
-        return names
 
     def _pictures(self, far: FarField, of: RayFan | Solution, output: Output) -> list[str]:
         names, folder = list[str](), output.folder

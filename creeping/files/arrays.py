@@ -90,7 +90,15 @@ def write_mat(
     if kinds:
         found = makers[kinds[0]](result)
     elif isinstance(result, Sequence) and all(isinstance(one, IsoPhaseCurve) for one in result):
-        found = _curves(result)
+        # curves do not know their body
+        found = {
+            "curve": (number_of(result), ""),
+            "points": (joined([c.points for c in result], 3), UNKNOWN),
+            "rays": (joined([c.rays for c in result]).astype(float), ""),
+            "of": _words([c.of for c in result]),
+            "level": (np.array([c.level for c in result]), UNKNOWN),
+            "closed": (np.array([c.closed for c in result], dtype=bool), ""),
+        }
     else:
         raise InvalidInputError(
             f"{type(result).__name__} is not written to .mat; give one of {', '.join(makers)}, or a list of "
@@ -147,18 +155,6 @@ def _fan(fan: RayFan) -> Content:
     of_points |= _attributes(fan, spreading_rate=curved, curvature=curved, attenuation=f"{length}^(1/3)")
     of_rays = _attributes(fan, caustic_index="", status="", detachment=time, curve_index="", arclength=length)
     return {name: (np.asarray(value), unit) for name, (value, unit) in (of_points | of_rays).items()} | _wave(fan.line)
-
-
-def _curves(curves: Sequence[IsoPhaseCurve]) -> Content:
-    # curves do not know their body
-    return {
-        "curve": (number_of(curves), ""),
-        "points": (joined([c.points for c in curves], 3), UNKNOWN),
-        "rays": (joined([c.rays for c in curves]).astype(float), ""),
-        "of": _words([c.of for c in curves]),
-        "level": (np.array([c.level for c in curves]), UNKNOWN),
-        "closed": (np.array([c.closed for c in curves], dtype=bool), ""),
-    }
 
 
 def _cut(cut: FieldCut) -> Content:

@@ -78,7 +78,22 @@ def write_ffe(
         If the file cannot be written.
     """
     t, p = (np.atleast_1d(np.asarray(axis, dtype=float)) for axis in (theta, phi))
-    _check_grid(far, t, p)
+    remedy = "; give far_field the directions of grid_directions(theta, phi)"
+    if t.ndim != 1 or p.ndim != 1 or not (np.all(np.isfinite(t)) and np.all(np.isfinite(p))):
+        raise InvalidInputError(f"theta {t.shape} and phi {p.shape} are not axes (t,), (p,) of finite radians")
+    directions = np.asarray(far.directions)
+    if len(directions) != t.size * p.size:
+        raise InvalidInputError(
+            f"a .ffe file holds a grid: the far field has {len(directions)} directions, a grid of {t.size} theta "
+            f"by {p.size} phi has {t.size * p.size}{remedy}"
+        )
+    off = np.linalg.norm(directions - grid_directions(t, p), axis=1)
+    if wrong := int(np.sum(off > 1e-9)):
+        worst = int(np.argmax(off))
+        raise InvalidInputError(
+            f"a .ffe file holds a grid: {wrong} of {len(directions)} directions are not on it "
+            f"(worst: row {worst}, off by {off[worst]:.2g}){remedy}"
+        )
     total = np.asarray(far.total)
     bad = np.flatnonzero(~np.all(np.isfinite(total.reshape(len(total), -1)), axis=1))
     if len(bad):
@@ -89,25 +104,6 @@ def write_ffe(
         )
     with written_aside(path) as aside, aside.open("w", encoding="ascii", newline="\n") as stream:
         stream.writelines(line + "\n" for line in _lines(far, t, p, direction))
-
-
-def _check_grid(far: FarField, theta: FloatArray, phi: FloatArray) -> None:
-    remedy = "; give far_field the directions of grid_directions(theta, phi)"
-    if theta.ndim != 1 or phi.ndim != 1 or not (np.all(np.isfinite(theta)) and np.all(np.isfinite(phi))):
-        raise InvalidInputError(f"theta {theta.shape} and phi {phi.shape} are not axes (t,), (p,) of finite radians")
-    directions = np.asarray(far.directions)
-    if len(directions) != theta.size * phi.size:
-        raise InvalidInputError(
-            f"a .ffe file holds a grid: the far field has {len(directions)} directions, a grid of {theta.size} theta "
-            f"by {phi.size} phi has {theta.size * phi.size}{remedy}"
-        )
-    off = np.linalg.norm(directions - grid_directions(theta, phi), axis=1)
-    if wrong := int(np.sum(off > 1e-9)):
-        worst = int(np.argmax(off))
-        raise InvalidInputError(
-            f"a .ffe file holds a grid: {wrong} of {len(directions)} directions are not on it "
-            f"(worst: row {worst}, off by {off[worst]:.2g}){remedy}"
-        )
 
 
 def _lines(far: FarField, theta: FloatArray, phi: FloatArray, direction: ArrayLike | None) -> Iterator[str]:

@@ -270,7 +270,16 @@ def write_sofa(
     library = required("sofar", use="SOFA files need", extra="hrtf")
     file = _filled(library.Sofa(_convention(convention, receivers)), first.directions, receivers, hertz, values)
     file.GLOBAL_Title = title
-    file.GLOBAL_Comment = _comment(given, speed, unit)
+    # what the numbers are, for those who open the file
+    bad = sum(int(np.sum(~one.ok)) for one in given)
+    error = max((float(np.max(one.error[one.ok], initial=0.0)) for one in given), default=0.0)
+    file.GLOBAL_Comment = (
+        f"creeping {__version__}: asymptotic, for short waves on a smooth body, {given[0].boundary} "
+        f"boundary, unit of length {unit:.10g} m, sound speed {speed:.10g} m/s. Sources are in the far field; their "
+        f"distance of {DISTANCE:g} m is nominal. Values are relative to the free field at the origin, phases with it, "
+        f"for exp(+i omega t). Largest stated error {error:.3g}; of {bad} of {sum(one.values.size for one in given)} "
+        "values the status is not OK."
+    )
     with written_aside(path) as aside:
         library.write_sofa(str(aside), file)
 
@@ -309,16 +318,3 @@ def _filled(file: Any, directions: FloatArray, receivers: FloatArray, hertz: Flo
     file.GLOBAL_RoomType = "free field"
     file.GLOBAL_ApplicationName, file.GLOBAL_ApplicationVersion = "creeping", __version__
     return file
-
-
-def _comment(given: Sequence[SourcePattern], speed: float, unit: float) -> str:
-    """What the numbers are, for those who open the file."""
-    bad = sum(int(np.sum(~one.ok)) for one in given)
-    error = max((float(np.max(one.error[one.ok], initial=0.0)) for one in given), default=0.0)
-    return (
-        f"creeping {__version__}: asymptotic, for short waves on a smooth body, {given[0].boundary} "
-        f"boundary, unit of length {unit:.10g} m, sound speed {speed:.10g} m/s. Sources are in the far field; their "
-        f"distance of {DISTANCE:g} m is nominal. Values are relative to the free field at the origin, phases with it, "
-        f"for exp(+i omega t). Largest stated error {error:.3g}; of {bad} of {sum(one.values.size for one in given)} "
-        "values the status is not OK."
-    )

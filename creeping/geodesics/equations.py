@@ -59,7 +59,7 @@ def _on_pieces(body: Surface) -> FloatArray:
 
 
 def _on_a_grid(body: Surface) -> FloatArray:
-    return triangulate(body.level, body.gradient, body.bounds).vertices
+    return triangulate(body).vertices
 
 
 def natural_horizon(body: Surface) -> float:

@@ -112,7 +112,7 @@ def check_surface(body: Surface) -> SurfaceReport:
     if is_piecewise(body):
         return _piecewise_report(body)
     checked_body(body)
-    mesh = triangulate(body.level, body.gradient, body.bounds)
+    mesh = triangulate(body)
     points = mesh.vertices
     components = mesh.components
     return SurfaceReport(

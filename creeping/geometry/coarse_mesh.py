@@ -72,8 +72,7 @@ def coarse_meshes(body: Any) -> Iterator[CoarseMesh | SurfaceError]:
 
 def _of_cells(body: Surface, cells: int) -> CoarseMesh:
     """Quadrilaterals of a smooth body on so many cells."""
-    given = body.level, body.gradient, body.bounds
-    vertices, tiles = quadrilaterals(*given, cells=cells, fewest=min(cells, 24), mirrored=True)
+    vertices, tiles = quadrilaterals(body, cells=cells, fewest=min(cells, 24), mirrored=True)
     return CoarseMesh(vertices, tiles, np.zeros(len(tiles), dtype=np.int64))
 
 

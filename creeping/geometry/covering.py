@@ -13,7 +13,6 @@ the body to POSITION and NORMAL, or as well as a fitted body is known, is halved
 Sources: [C67], [BT04]; Derivations, B14.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +23,7 @@ from creeping.geometry.coarse_mesh import CoarseMesh, coarse_meshes, tip_vertice
 from creeping.geometry.patches import DEGREE, ENDS, Patches, lobatto, on_squares
 from creeping.geometry.piecewise import is_piecewise, nearest_crease, pieces_of
 from creeping.geometry.quadrature import nearest_points
-from creeping.geometry.surface import Chart, Surface, memo, size
+from creeping.geometry.surface import Surface, memo, size
 
 POSITION, NORMAL = 2e-6, 3e-4
 """What squares may be off the body, in its sizes, and their normals, radians."""
@@ -68,7 +67,22 @@ def _made(body: Surface) -> Patches | str:
     ground, best, least = _Ground(body), None, np.inf
     charts = () if is_piecewise(body) else getattr(body, "tiling", ())
     if charts:
-        found = _of_charts(ground, charts)
+        # parts of the unit squares of charts that cover a body once, parted until they are the body
+        t, done = lobatto(DEGREE), []
+        for chart in charts:
+            low = np.stack(np.meshgrid(*[np.arange(PARTS) / PARTS] * 2), axis=-1).reshape(-1, 2)
+            high = low + 1 / PARTS
+            for turn in range(ROUNDS + 1):
+                u, v = (low[:, axis, None] + (high - low)[:, axis, None] * t for axis in (0, 1))
+                grid = np.broadcast_arrays(u[:, :, None], v[:, None, :])
+                current = _smooth(chart.point(np.stack(grid, axis=-1)))
+                off, _, good = ground.misfit(current)
+                poor = ~good & (turn < ROUNDS)
+                done.append(replace(current, off=off)[~poor])
+                if not np.any(poor):
+                    break
+                low, high = _halves(low[poor], high[poor], _long(current[poor]))
+        found = Patches.joined(done)
         if np.max(found.off) < WORST * ground.size:
             return found
     failure: Exception | None = None
@@ -286,25 +300,6 @@ def _along(points: FloatArray, lines: FloatArray) -> FloatArray:
     if closed:
         along = along - s[-1] * np.round(along / s[-1])
     return np.asarray(curve(start[:, None] + along[:, None] * lobatto(lines.shape[1] - 1)))
-
-
-def _of_charts(ground: _Ground, charts: Sequence[Chart]) -> Patches:
-    """Parts of the unit squares of charts that cover a body once, parted until they are the body."""
-    t, done = lobatto(DEGREE), []
-    for chart in charts:
-        low = np.stack(np.meshgrid(*[np.arange(PARTS) / PARTS] * 2), axis=-1).reshape(-1, 2)
-        high = low + 1 / PARTS
-        for turn in range(ROUNDS + 1):
-            u, v = (low[:, axis, None] + (high - low)[:, axis, None] * t for axis in (0, 1))
-            grid = np.broadcast_arrays(u[:, :, None], v[:, None, :])
-            current = _smooth(chart.point(np.stack(grid, axis=-1)))
-            off, _, good = ground.misfit(current)
-            poor = ~good & (turn < ROUNDS)
-            done.append(replace(current, off=off)[~poor])
-            if not np.any(poor):
-                break
-            low, high = _halves(low[poor], high[poor], _long(current[poor]))
-    return Patches.joined(done)
 
 
 def _halves(low: FloatArray, high: FloatArray, along: BoolArray) -> tuple[FloatArray, FloatArray]:

@@ -135,9 +135,7 @@ def parabolic_points(body: Surface, mesh: Triangulation | None = None) -> Parabo
     >>> bool(abs(abs(found.points[:, 2]) - 0.5).max() < 1e-6), bool(abs(found.across - 2.0).max() < 1e-4)
     (True, True)
     """
-    return memo(
-        body, "parabolic points", lambda: _found(body, mesh or triangulate(body.level, body.gradient, body.bounds))
-    )
+    return memo(body, "parabolic points", lambda: _found(body, mesh or triangulate(body)))
 
 
 def _found(body: Surface, mesh: Triangulation) -> ParabolicPoints:

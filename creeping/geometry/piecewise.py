@@ -154,7 +154,7 @@ def drawn_mesh(body: Any, cells: int) -> tuple[Triangulation, FloatArray]:
         tiles = tiles_of(body, 2.0 / cells)
         corners = tiles.corners.reshape(-1, 3)
         return Triangulation(corners, np.arange(len(corners)).reshape(-1, 3)), tiles.normals.reshape(-1, 3)
-    mesh = triangulate(body.level, body.gradient, body.bounds, cells=cells)
+    mesh = triangulate(body, cells=cells)
     return mesh, normal(body, mesh.vertices)
 
 

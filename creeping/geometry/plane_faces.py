@@ -9,7 +9,7 @@ Sources: [M75] for the ears, [E02] for the bridges.
 
 import numpy as np
 
-from creeping._typing import Any, BoolArray, FloatArray, IntArray
+from creeping._typing import Any, FloatArray, IntArray
 from creeping.geometry.patches import PLANE, Triangles, sides_of, turns_of
 from creeping.geometry.triangulation import Triangulation, connected
 
@@ -33,17 +33,30 @@ def with_whole_faces(body: Any) -> Triangles | None:
     (192, 12)
     """
     vertices, triangles = np.asarray(body.vertices), np.asarray(body.triangles)
-    face = _faces(vertices, triangles)
+    # number of the face of each triangle (t,)
+    _, number = sides_of(triangles)
+    turned, beside = turns_of(vertices, triangles, number)
+    face = connected(len(triangles), beside[turned < PLANE])[1]
     if 4 * face.max(initial=0) > len(triangles):
         return None
     outlines = _outlines(triangles, face)
     if outlines is None:
         return None
-    stays = _corners(vertices, outlines)
+    # which vertices (n,) stay: where other than two faces meet, or outlines turn
+    met, turns = np.zeros(len(vertices), dtype=int), np.zeros(len(vertices), dtype=bool)
+    for loops in outlines:
+        for loop in loops:
+            back, ahead = (vertices[np.roll(loop, -step)] - vertices[loop] for step in (-1, 1))
+            across = np.linalg.norm(np.cross(-back, ahead), axis=1)
+            turns[loop] |= np.arctan2(across, np.sum(-back * ahead, axis=1)) > PLANE
+            met[loop] += 1
+    stays = np.asarray((met > 0) & (turns | (met != 2)))
     found: list[IntArray] = []
     each = np.split(triangles[np.argsort(face, kind="stable")], np.cumsum(np.bincount(face))[:-1])
     for own, loops in zip(each, outlines, strict=True):
-        normal, corners = _normal(vertices, own), vertices[np.unique(own)]
+        a, b, c = np.moveaxis(vertices[own], 1, 0)
+        total = np.sum(np.cross(b - a, c - a), axis=0)
+        normal, corners = np.asarray(total / np.linalg.norm(total)), vertices[np.unique(own)]
         # neighbours in one plane may bend together
         bulges = np.ptp((corners - corners.mean(axis=0)) @ normal) > BULGE * np.max(np.ptp(corners, axis=0))
         cut = None if bulges else _cut(vertices, [loop[stays[loop]] for loop in loops], normal)
@@ -56,13 +69,6 @@ def with_whole_faces(body: Any) -> Triangles | None:
     area, before = (Triangulation(*one).area for one in ((whole.vertices, whole.triangles), (vertices, triangles)))
     closed = np.all(np.bincount(sides_of(whole.triangles)[1].ravel()) == 2)
     return whole if np.isclose(area, before, rtol=1e-6) and closed and len(made) < len(triangles) else None
-
-
-def _faces(vertices: FloatArray, triangles: IntArray) -> IntArray:
-    """Number of the face of each triangle (t,)."""
-    _, number = sides_of(triangles)
-    turned, beside = turns_of(vertices, triangles, number)
-    return connected(len(triangles), beside[turned < PLANE])[1]
 
 
 def _outlines(triangles: IntArray, face: IntArray) -> list[list[IntArray]] | None:
@@ -90,24 +96,6 @@ def _outlines(triangles: IntArray, face: IntArray) -> list[list[IntArray]] | Non
                 step = own.pop(step)
             loops.append(np.array(loop))
     return found
-
-
-def _corners(vertices: FloatArray, outlines: list[list[IntArray]]) -> BoolArray:
-    """Which vertices (n,) stay: where other than two faces meet, or outlines turn."""
-    met, turns = np.zeros(len(vertices), dtype=int), np.zeros(len(vertices), dtype=bool)
-    for loops in outlines:
-        for loop in loops:
-            back, ahead = (vertices[np.roll(loop, -step)] - vertices[loop] for step in (-1, 1))
-            across = np.linalg.norm(np.cross(-back, ahead), axis=1)
-            turns[loop] |= np.arctan2(across, np.sum(-back * ahead, axis=1)) > PLANE
-            met[loop] += 1
-    return np.asarray((met > 0) & (turns | (met != 2)))
-
-
-def _normal(vertices: FloatArray, triangles: IntArray) -> FloatArray:
-    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
-    total = np.sum(np.cross(b - a, c - a), axis=0)
-    return np.asarray(total / np.linalg.norm(total))
 
 
 def _cut(vertices: FloatArray, loops: list[IntArray], normal: FloatArray) -> IntArray | None:

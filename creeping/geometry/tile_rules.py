@@ -112,16 +112,7 @@ class Rules:
 
     def rule(self, body: Surface, rate: float) -> tuple[int, int, int]:
         """Cells of the mesh, points along a side of its tiles, and the number of these, for a rate, 1/L."""
-        fine = self._fine(body, rate)
-        if self.cells > CELLS:
-            return fine
-        meshes = [cells for cells in COARSE if cells >= self._coarsest]
-        cheaper = [rule for cells in meshes for rule in self._coarse(body, rate, cells, fine)]
-        closing = (rule for rule in sorted(cheaper, key=_cost) if self._closes(body, *rule[:2]))
-        return next(closing, fine)
-
-    def _fine(self, body: Surface, rate: float) -> tuple[int, int, int]:
-        """That of the coarsest mesh whose tiles, with few points, are small against the curvature."""
+        # that of the coarsest mesh whose tiles, with few points, are small against the curvature
         cells = self.cells
         size = self.size(body, cells)
         points = points_for(0.5 * rate * size.edge)
@@ -129,7 +120,13 @@ class Rules:
             cells = finer(cells)
             size = self.size(body, cells)
             points = points_for(0.5 * rate * size.edge)
-        return cells, points, size.tiles
+        fine = cells, points, size.tiles
+        if self.cells > CELLS:
+            return fine
+        meshes = [cells for cells in COARSE if cells >= self._coarsest]
+        cheaper = [rule for cells in meshes for rule in self._coarse(body, rate, cells, fine)]
+        closing = (rule for rule in sorted(cheaper, key=_cost) if self._closes(body, *rule[:2]))
+        return next(closing, fine)
 
     def _coarse(self, body: Surface, rate: float, cells: int, fine: tuple[int, int, int]) -> list[tuple[int, int, int]]:
         """Rules of a coarse mesh which resolve the rate and cost less than the fine one, if the mesh is as the body."""
@@ -160,7 +157,7 @@ class Rules:
         """Vertices and quadrilaterals of a mesh."""
         if self._mesh is None or self._mesh[0] != cells:
             fewest = min(cells, CELLS)
-            self._mesh = cells, quadrilaterals(body.level, body.gradient, body.bounds, cells=cells, fewest=fewest)
+            self._mesh = cells, quadrilaterals(body, cells=cells, fewest=fewest)
         return self._mesh[1]
 
     def size(self, body: Surface, cells: int) -> "_Size":

@@ -7,14 +7,14 @@ oriented by construction and follows the topology of F at the grid's resolution,
 Sources: [G98], [JLSW02]; Derivations, B8.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from creeping.errors import SurfaceError
-from creeping.geometry.surface import step_onto
+from creeping.geometry.surface import Surface, step_onto
 
 MAX_POINTS = 12_000_000
 """Grid points of the finest triangulation."""
@@ -76,21 +76,13 @@ def connected(count: int, pairs: IntArray) -> tuple[int, IntArray]:
     return int(found), np.asarray(part)
 
 
-def triangulate(
-    level: Callable[[FloatArray], FloatArray],
-    gradient: Callable[[FloatArray], FloatArray],
-    bounds: FloatArray,
-    *,
-    cells: int = 48,
-) -> Triangulation:
+def triangulate(body: Surface, *, cells: int = 48) -> Triangulation:
     """Triangulate F = 0 inside its box.
 
     Parameters
     ----------
-    level, gradient : callable
-        F and its gradient, (..., 3) -> (...) and (..., 3).
-    bounds : (2, 3), L
-        Box that contains the body; it is widened by two cells.
+    body : Surface
+        Its box is widened by two cells.
     cells : int
         Cells along the side of a cube of the box's volume; raised by half where that does not resolve the topology.
 
@@ -107,11 +99,11 @@ def triangulate(
     --------
     >>> import scatterers as sc
     >>> ring = sc.Torus()
-    >>> mesh = triangulate(ring.level, ring.gradient, ring.bounds, cells=24)
+    >>> mesh = triangulate(ring, cells=24)
     >>> mesh.euler_characteristic, mesh.components
     (0, 1)
     """
-    vertices, tiles = quadrilaterals(level, gradient, bounds, cells=cells)
+    vertices, tiles = quadrilaterals(body, cells=cells)
     return Triangulation(vertices, np.concatenate([tiles[:, [0, 1, 2]], tiles[:, [0, 2, 3]]]))
 
 
@@ -139,23 +131,17 @@ def checked_extent(bounds: FloatArray) -> FloatArray:
 
 
 def quadrilaterals(
-    level: Callable[[FloatArray], FloatArray],
-    gradient: Callable[[FloatArray], FloatArray],
-    bounds: FloatArray,
-    *,
-    cells: int = 48,
-    fewest: int = ACROSS,
-    mirrored: bool = False,
+    body: Surface, *, cells: int = 48, fewest: int = ACROSS, mirrored: bool = False
 ) -> tuple[FloatArray, IntArray]:
     """Vertices (n, 3), L, and quadrilaterals (m, 4), counter-clockwise, that `triangulate` halves; see there.
 
     There are ``fewest`` cells or more across each side of the box. If ``mirrored``, those of a body whose mirrors are
     the middle planes of the box are so, too.
     """
-    box = checked_extent(bounds)
+    box = checked_extent(body.bounds)
     for count in _counts(box, cells, fewest):
         axes = _grid_axes(box, count, fewest, mirrored=mirrored)
-        values = _grid_values(level, axes)
+        values = _grid_values(body, axes)
         vertices, number = _cell_vertices(values, values < 0, axes)
         tiles = _around_edges(values < 0, number)
         open_at = _unclosed(tiles)
@@ -170,7 +156,24 @@ def quadrilaterals(
             "is to be refined or smoothed there"
         )
     reach = max(float(axis[1] - axis[0]) for axis in axes)
-    return _onto_surface(level, gradient, vertices, reach), tiles
+    # Newton along the gradient, each step at most `reach`; a vertex that fails raises
+    points = vertices.copy()
+    distance = np.full(len(points), np.inf)
+    for _ in range(20):
+        step, distance = step_onto(body.level(points), body.gradient(points), reach)
+        points = points + step
+        if not np.all(np.isfinite(points)):
+            break
+        if np.max(np.abs(distance)) < 1e-14 * max(1.0, float(np.abs(points).max())):
+            break
+    bad = ~(np.abs(distance) < 1e-9 * max(1.0, float(np.nanmax(np.abs(points)))))
+    if bad.any():
+        worst = vertices[bad][0]
+        raise SurfaceError(
+            f"{int(bad.sum())} of {len(points)} vertices found no point with F = 0 and grad F != 0 "
+            f"(first near {np.round(worst, 4).tolist()}); the surface is not smooth there"
+        )
+    return points, tiles
 
 
 def _counts(box: FloatArray, cells: int, fewest: int) -> Iterator[int]:
@@ -203,9 +206,9 @@ def _grid_axes(box: FloatArray, cells: int, fewest: int, *, mirrored: bool = Fal
     return [low[k] + spacing[k] * np.arange(count[k] + 6) for k in range(3)]
 
 
-def _grid_values(level: Callable[[FloatArray], FloatArray], axes: list[FloatArray]) -> FloatArray:
+def _grid_values(body: Surface, axes: list[FloatArray]) -> FloatArray:
     """F on the grid, checked: finite, negative somewhere, positive on the faces."""
-    values = np.asarray(level(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)), dtype=float)
+    values = np.asarray(body.level(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)), dtype=float)
     if not np.all(np.isfinite(values)):
         count = int(np.sum(~np.isfinite(values)))
         raise SurfaceError(f"F is not finite at {count} of {values.size} grid points of its box; check the expression")
@@ -283,29 +286,3 @@ def _unclosed(tiles: IntArray) -> IntArray:
     keys, place, counts = np.unique(code, return_inverse=True, return_counts=True)
     wrong = (counts != 2) | (np.bincount(place, weights=sign, minlength=len(keys)) != 0)
     return np.unique(keys[wrong] // (tiles.max() + 1))
-
-
-def _onto_surface(
-    level: Callable[[FloatArray], FloatArray],
-    gradient: Callable[[FloatArray], FloatArray],
-    vertices: FloatArray,
-    reach: float,
-) -> FloatArray:
-    """Newton along the gradient, each step at most ``reach``; a vertex that fails raises."""
-    points = vertices.copy()
-    distance = np.full(len(points), np.inf)
-    for _ in range(20):
-        step, distance = step_onto(level(points), gradient(points), reach)
-        points = points + step
-        if not np.all(np.isfinite(points)):
-            break
-        if np.max(np.abs(distance)) < 1e-14 * max(1.0, float(np.abs(points).max())):
-            break
-    bad = ~(np.abs(distance) < 1e-9 * max(1.0, float(np.nanmax(np.abs(points)))))
-    if bad.any():
-        worst = vertices[bad][0]
-        raise SurfaceError(
-            f"{int(bad.sum())} of {len(points)} vertices found no point with F = 0 and grad F != 0 "
-            f"(first near {np.round(worst, 4).tolist()}); the surface is not smooth there"
-        )
-    return points

@@ -119,7 +119,13 @@ def plot_echo(
         draw_echo_map(ax, echo, number, shown_range([echo.levels()[number]], span))
         return pages.finished(ax, fresh, f"{echo.channels[number]}; veiled: unresolved", legend=False)
     at = (slice(None), 0) if angles > 1 else (0, slice(None))
-    curves = _curves(echo, at)
+    levels, bounds = echo.levels(), np.stack(echo.bounds())
+    levels[np.isposinf(levels)] = np.nan
+    places = [(number, *at) for number in range(len(echo.channels))]
+    curves = [
+        Curve(channel, levels[here], pages.curve_style(here[0]), bounds[(slice(None), *here)], echo.unresolved[here])
+        for channel, here in zip(echo.channels, places, strict=True)
+    ]
     low, high = heights_of(curves, span)
     for number, curve in enumerate(curves):
         # a word for those that lie below the picture as a whole
@@ -210,16 +216,6 @@ def comparison_picture(
         pages.dressed(above, "", _level(echo))
         pages.dressed(below, f"frequency ({unit})" if band else f"{echo.angle_name} ({unit})", "residual (dB)")
         pages.finished(above, True, title)
-
-
-def _curves(echo: "Echo", at: tuple[Any, Any]) -> list[Curve]:
-    levels, bounds = echo.levels(), np.stack(echo.bounds())
-    levels[np.isposinf(levels)] = np.nan
-    places = [(number, *at) for number in range(len(echo.channels))]
-    return [
-        Curve(channel, levels[here], pages.curve_style(here[0]), bounds[(slice(None), *here)], echo.unresolved[here])
-        for channel, here in zip(echo.channels, places, strict=True)
-    ]
 
 
 def _level(echo: "Echo") -> str:

@@ -414,15 +414,11 @@ def plot_far(
     fresh, ax = pages.axes_or_new(ax, pages.PAGE)
     unit, values = unit or far.unit, cut.values[cut.order]
     draw_cut(ax, values, curves, heights, level=level_name(quantity, unit, [far.total]), angle_name=cut.name)
-    _mark(ax, values, curves, heights[1])
-    return pages.finished(ax, fresh, f"{pages.wave_title(far, unit)} boundary", legend)
-
-
-def _mark(ax: Any, angle: FloatArray, curves: Sequence[Curve], high: float) -> None:
-    """Crosses where there is no curve."""
-    x = angle if ax.name == "polar" else np.degrees(angle)
+    # crosses where there is no curve
+    x = values if ax.name == "polar" else np.degrees(values)
     look: dict[str, Any] = {"linestyle": "none", "markersize": 4, "markeredgewidth": 0.8, "zorder": 4}
     gone = np.any([np.isnan(curve.levels) for curve in curves if curve.thick], axis=0)
     if np.any(gone):
-        height = np.full(int(gone.sum()), high)
+        height = np.full(int(gone.sum()), heights[1])
         ax.plot(x[gone], height, marker="x", color=pages.GREY, label="not finite", clip_on=False, **look)
+    return pages.finished(ax, fresh, f"{pages.wave_title(far, unit)} boundary", legend)

@@ -176,7 +176,22 @@ def draw(ax: Any, drawing: Drawing) -> None:
     # 3-D axes are square; a wide body may use all of the place they were given
     for artist in ax.collections:
         artist.set_clip_on(False)
-    _frame(ax, drawing)
+    # equal aspect, no axes, everything in the picture and nothing wasted
+    low, high = drawing.frame
+    half = 0.5 * float(np.max(high - low))
+    ax.set_axis_off()
+    ax.set_proj_type("ortho")
+    ax.view_init(elev=np.degrees(drawing.view.elevation), azim=np.degrees(drawing.view.azimuth))
+    ax.set(**{f"{axis}lim": (at - half, at + half) for axis, at in zip("xyz", drawing.centre, strict=True)})
+    ax.set_box_aspect((1, 1, 1), zoom=1.0)
+    # mplot3d does not say how large it draws nor where: measure, correct the size, measure, correct the place
+    place = ax.get_position(original=True).transformed(ax.figure.transSubfigure)
+    _, unit = _measure(ax, drawing)
+    ax.set_box_aspect((1, 1, 1), zoom=float(np.min(np.array([place.width, place.height]) / (unit * (high - low)))))
+    centre, unit = _measure(ax, drawing)
+    off = (centre - 0.5 * (place.min + place.max)) / unit
+    moved = drawing.centre + off[0] * drawing.view.right + off[1] * drawing.view.up
+    ax.set(**{f"{axis}lim": (at - half, at + half) for axis, at in zip("xyz", moved, strict=True)})
 
 
 def _draw_body(ax: Any, drawing: Drawing) -> None:
@@ -221,25 +236,6 @@ def _draw_stroke(ax: Any, drawing: Drawing, stroke: Stroke) -> None:
             look: dict[str, Any] = {"colors": stroke.colour, "linewidths": stroke.width, "alpha": stroke.alpha * share}
             look |= {"capstyle": "butt", "joinstyle": "round", "zorder": 2 + stroke.rank + above}
             ax.add_collection3d(Line3DCollection(pieces, **look))
-
-
-def _frame(ax: Any, drawing: Drawing) -> None:
-    """Equal aspect, no axes, everything in the picture and nothing wasted."""
-    low, high = drawing.frame
-    half = 0.5 * float(np.max(high - low))
-    ax.set_axis_off()
-    ax.set_proj_type("ortho")
-    ax.view_init(elev=np.degrees(drawing.view.elevation), azim=np.degrees(drawing.view.azimuth))
-    ax.set(**{f"{axis}lim": (at - half, at + half) for axis, at in zip("xyz", drawing.centre, strict=True)})
-    ax.set_box_aspect((1, 1, 1), zoom=1.0)
-    # mplot3d does not say how large it draws nor where: measure, correct the size, measure, correct the place
-    place = ax.get_position(original=True).transformed(ax.figure.transSubfigure)
-    _, unit = _measure(ax, drawing)
-    ax.set_box_aspect((1, 1, 1), zoom=float(np.min(np.array([place.width, place.height]) / (unit * (high - low)))))
-    centre, unit = _measure(ax, drawing)
-    off = (centre - 0.5 * (place.min + place.max)) / unit
-    moved = drawing.centre + off[0] * drawing.view.right + off[1] * drawing.view.up
-    ax.set(**{f"{axis}lim": (at - half, at + half) for axis, at in zip("xyz", moved, strict=True)})
 
 
 def _measure(ax: Any, drawing: Drawing) -> tuple[FloatArray, FloatArray]:

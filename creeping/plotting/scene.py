@@ -32,16 +32,6 @@ raise SystemExit(0 if image.max() > image.min() else 3)
 """
 
 
-def require_gl() -> None:
-    """Raise a CreepingError with the remedy where pyvista cannot draw; to be called before pyvista is imported."""
-    probe = gl_available()
-    if not probe.ok:
-        raise CreepingError(f"pyvista cannot draw here: {probe.reason}; or draw with matplotlib")
-    # without an X server VTK tries one first and complains before it takes EGL: it is told what it will find
-    if sys.platform == "linux" and not os.environ.get("DISPLAY"):
-        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-
-
 def render(drawing: Drawing, pixels: tuple[int, int], *, scale: float) -> NDArray[np.float32]:
     """Image (height, width, 3) in 0..1, without arrows, in which lines behind the body keep a share of their ink.
 
@@ -50,7 +40,13 @@ def render(drawing: Drawing, pixels: tuple[int, int], *, scale: float) -> NDArra
     Two renderings, with the body and without it, multiplied like inks: a translucent body would need its layers
     sorted, which software renderers do badly, and would mix its own far side in.
     """
-    require_gl()
+    # raise a CreepingError with the remedy where pyvista cannot draw; to be called before pyvista is imported
+    probe = gl_available()
+    if not probe.ok:
+        raise CreepingError(f"pyvista cannot draw here: {probe.reason}; or draw with matplotlib")
+    # without an X server VTK tries one first and complains before it takes EGL: it is told what it will find
+    if sys.platform == "linux" and not os.environ.get("DISPLAY"):
+        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     import pyvista
 
     plotter = pyvista.Plotter(off_screen=True, window_size=pixels)

@@ -85,7 +85,7 @@ def specular_points(
     length = np.linalg.norm(difference, axis=1)
     rows = np.flatnonzero(length > 1e-9)
     wanted = difference[rows] / length[rows, None]
-    mesh = mesh or triangulate(body.level, body.gradient, body.bounds)
+    mesh = mesh or triangulate(body)
     which, seeds = _seeds(body, mesh.vertices, mesh.triangles, wanted)
     which, points = _newton(body, seeds, wanted, which)
     row = rows[which]

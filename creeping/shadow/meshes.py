@@ -90,7 +90,7 @@ def _mesh_of(body: Surface, vertices: int) -> Triangulation:
     """Triangulation with about so many vertices."""
     cells = int(np.sqrt(vertices / 3))
     for _ in range(4):
-        mesh = triangulate(body.level, body.gradient, body.bounds, cells=max(cells, 8))
+        mesh = triangulate(body, cells=max(cells, 8))
         ratio = np.sqrt(vertices / len(mesh.vertices))
         if 0.93 < ratio < 1.07:
             break

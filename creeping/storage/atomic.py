@@ -60,7 +60,9 @@ def written_aside(path: str | os.PathLike[str]) -> Iterator[Path]:
                 shutil.copyfileobj(made, stream)
             return
         aside.chmod(_mode(real))
-        _on_disk(aside)
+        # wait until a file is on disk: renamed before it is, it would be empty after a power failure
+        with open(aside, "rb+") as stream:
+            os.fsync(stream.fileno())
         os.replace(aside, real)
         aside = None
     except OSError as error:
@@ -100,12 +102,6 @@ def _mode(path: Path) -> int:
     umask = os.umask(0)
     os.umask(umask)
     return 0o666 & ~umask
-
-
-def _on_disk(path: Path) -> None:
-    """Wait until a file is on disk: renamed before it is, it would be empty after a power failure."""
-    with open(path, "rb+") as stream:
-        os.fsync(stream.fileno())
 
 
 def opened(path: str | os.PathLike[str], most: float = math.inf) -> io.BufferedReader:

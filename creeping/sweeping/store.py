@@ -286,28 +286,6 @@ class SweepStore:
                 lost[task] = name
         return lost
 
-    def require_whole(self) -> None:
-        """Refuse a store whose descriptions are damaged, or that lacks chunks of done tasks.
-
-        Raises
-        ------
-        CreepingError
-            Of chunks with the first of them and their number.
-        """
-        if not self._is_described():
-            raise CreepingError(
-                f"what describes arrays or holds coordinates in {self.folder} is damaged or missing; to write it anew, "
-                "resume"
-            )
-        lost = self.lost()
-        if lost:
-            task, name = next(iter(lost.items()))
-            raise CreepingError(
-                f"{name} of {self._place(task)} is missing in {self.folder} ({len(lost)} such tasks); to compute it "
-                "anew, resume",
-                task=task,
-            )
-
     def _is_described(self) -> bool:
         try:
             found = layout.unchanging_digest(self.folder, self.variables, self.content["coordinates"])
@@ -331,9 +309,22 @@ class SweepStore:
         Raises
         ------
         CreepingError
-            As `require_whole`, and of one that is loaded if a chunk is damaged.
+            If the store is damaged or incomplete; of one that is loaded also if a chunk is damaged.
         """
-        self.require_whole()
+        # refuse a store whose descriptions are damaged, or that lacks chunks of done tasks
+        if not self._is_described():
+            raise CreepingError(
+                f"what describes arrays or holds coordinates in {self.folder} is damaged or missing; to write it anew, "
+                "resume"
+            )
+        lost = self.lost()
+        if lost:
+            task, name = next(iter(lost.items()))
+            raise CreepingError(
+                f"{name} of {self._place(task)} is missing in {self.folder} ({len(lost)} such tasks); to compute it "
+                "anew, resume",
+                task=task,
+            )
         options: dict[str, Any] = {"consolidated": False} | ({"chunks": None} if loaded else {})
         with self.reading("a variable"):
             opened: xarray.Dataset = register().open_zarr(self.folder, **options)

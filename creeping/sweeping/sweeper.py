@@ -225,7 +225,30 @@ class Sweeper:
                 out[name][rows] = found
             if request.method in ("rays", "auto"):
                 return self._fill_by_rays(lines, rows, self._tracer, out, passed)
-        self._fill_one_by_one(incidences, rows, each, out, passed)
+        # fields of each incidence as the dispatcher has them
+        request, cases = self.request, self._cases()
+        directions, observers = incidences[rows], self._observers(incidences[rows])
+        # the equation is solved for all incidences at once, and these come before the next one
+        together = request.order == 2 and (
+            request.method == "equation" or (self._piecewise and request.method in ("auto", "currents"))
+        )
+        fans = lru_cache(None if together else 1)(
+            lambda number: self._fan(directions[number], each[rows[number]] if each else None)
+        )
+        numbers = range(len(rows))
+        jobs = list(product(cases, numbers)) if together else [(case, n) for n, case in product(numbers, cases)]
+        for done, (case, number) in enumerate(jobs, 1):
+            (k, wavenumber), (name, _, _) = case
+            boundary = parse_boundary(name)
+            if together and number == 0:
+                solve_together(self.body, directions, wavenumber, boundary, fine=request.method == "equation")
+            field = _field(fans(number), observers[number], wavenumber, boundary, request)
+            some = rows[number : number + 1]
+            self._put(out, some, case, FieldArrays.of(field, 1).arrays)
+            if field.validity is not None and self._piecewise:
+                for known, value in zip(VALID, field.validity, strict=True):
+                    out[known][some, k] = value
+            passed(done / len(jobs))
         return None
 
     def _fill_by_rays(self, lines: ShadowLines, rows: IntArray, tracer: RayTracer, out: Arrays, passed: Passed) -> Made:
@@ -256,34 +279,6 @@ class Sweeper:
             self._put(out, rows, case, field.arrays)
             passed(len(made) / len(cases))
         return rows, geometry, [parts for which in range(kinds) for parts in made[which::kinds]]
-
-    def _fill_one_by_one(
-        self, incidences: FloatArray, rows: IntArray, lines: list[ShadowLine | None] | None, out: Arrays, passed: Passed
-    ) -> None:
-        """Fields of each incidence as the dispatcher has them."""
-        request, cases = self.request, self._cases()
-        directions, observers = incidences[rows], self._observers(incidences[rows])
-        # the equation is solved for all incidences at once, and these come before the next one
-        together = request.order == 2 and (
-            request.method == "equation" or (self._piecewise and request.method in ("auto", "currents"))
-        )
-        fans = lru_cache(None if together else 1)(
-            lambda number: self._fan(directions[number], lines[rows[number]] if lines else None)
-        )
-        numbers = range(len(rows))
-        jobs = list(product(cases, numbers)) if together else [(case, n) for n, case in product(numbers, cases)]
-        for done, (case, number) in enumerate(jobs, 1):
-            (k, wavenumber), (name, _, _) = case
-            boundary = parse_boundary(name)
-            if together and number == 0:
-                solve_together(self.body, directions, wavenumber, boundary, fine=request.method == "equation")
-            field = _field(fans(number), observers[number], wavenumber, boundary, request)
-            some = rows[number : number + 1]
-            self._put(out, some, case, FieldArrays.of(field, 1).arrays)
-            if field.validity is not None and self._piecewise:
-                for known, value in zip(VALID, field.validity, strict=True):
-                    out[known][some, k] = value
-            passed(done / len(jobs))
 
     def _fill_without_lines(self, incidences: FloatArray, rows: IntArray, out: Arrays) -> None:
         """Fields of incidences whose lines cross themselves, by the equation if it costs little enough; else none."""

@@ -22,7 +22,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from creeping._typing import FloatArray, IntArray
-from scatterers.body import Crease, Levelled, normals_of
+from scatterers.body import Crease, Levelled, Piece, normals_of
 from scatterers.charts.samples import Field, sampled, towards
 from scatterers.triangles.regions import curves
 from scatterers.triangles.topology import cut, edges_of
@@ -49,11 +49,7 @@ class Clipped(NamedTuple):
 
 
 def clip(
-    body: Levelled,
-    pieces: Sequence[Levelled],
-    numbers: Callable[[FloatArray], IntArray],
-    points: FloatArray,
-    triangles: IntArray,
+    body: Levelled, pieces: list[Piece], numbers: Callable[..., IntArray], points: FloatArray, triangles: IntArray
 ) -> Clipped:
     """Triangles (m, 3) with corners among points (n, 3), L, on the body, cut where the number of the piece changes."""
     kind = numbers(points)
@@ -67,39 +63,25 @@ def clip(
     kind = np.concatenate([kind, np.full(len(middle), -1)])
     start, end = edges_of(triangles).ends.T
     at = np.flatnonzero((kind[start] != kind[end]) & (kind[start] >= 0) & (kind[end] >= 0))
-    start, end = start[at], end[at]
-    between = _on_both(body, pieces, numbers, points[start], points[end], kind[start], kind[end])
-    vertices, triangles = cut(points, triangles, at, between)
-    kind = np.concatenate([kind, np.full(len(at), -1)])
-    return Clipped(vertices, triangles, kind[triangles].max(axis=1))
-
-
-def _on_both(
-    body: Levelled,
-    pieces: Sequence[Levelled],
-    numbers: Callable[[FloatArray], IntArray],
-    a: FloatArray,
-    b: FloatArray,
-    ka: IntArray,
-    kb: IntArray,
-) -> FloatArray:
-    """Points (n, 3) between a and b where the piece changes."""
-    middle = 0.5 * (a + b)
-    na, nb = (normals_of(pieces, middle, k) for k in (ka, kb))
+    a, b, ka, kb = points[start[at]], points[end[at]], kind[start[at]], kind[end[at]]
+    middles = 0.5 * (a + b)
+    na, nb = (normals_of(pieces, middles, k) for k in (ka, kb))
     # at a smaller angle both levels together do not tell the place
     steep = np.linalg.norm(np.cross(na, nb), axis=-1) > 1e-3
-    found = middle.copy()
-    found[steep] = _on_all(pieces, middle[steep], np.stack([ka, kb], axis=-1)[steep])
+    between = middles.copy()
+    between[steep] = _on_all(pieces, middles[steep], np.stack([ka, kb], axis=-1)[steep])
     # where the surfaces do not meet within a cell, and where they touch; the sides of an acute edge cut it short
-    far = np.linalg.norm(found - middle, axis=-1) > np.max(np.linalg.norm(b - a, axis=-1), initial=0.0)
+    far = np.linalg.norm(between - middles, axis=-1) > np.max(np.linalg.norm(b - a, axis=-1), initial=0.0)
     halved = (~steep | far) & (ka != kb)
     low, high, first = a[halved], b[halved], ka[halved]
     for _ in range(np.finfo(float).nmant):
-        at = towards(body.compiled, 0.5 * (low + high), 3)
-        same = (numbers(at) == first)[:, None]
-        low, high = np.where(same, at, low), np.where(same, high, at)
-    found[halved] = 0.5 * (low + high)
-    return found
+        half = towards(body.compiled, 0.5 * (low + high), 3)
+        same = (numbers(half) == first)[:, None]
+        low, high = np.where(same, half, low), np.where(same, high, half)
+    between[halved] = 0.5 * (low + high)
+    vertices, triangles = cut(points, triangles, at, between)
+    kind = np.concatenate([kind, np.full(len(at), -1)])
+    return Clipped(vertices, triangles, kind[triangles].max(axis=1))
 
 
 def _on_all(pieces: Sequence[Levelled], points: FloatArray, which: IntArray) -> FloatArray:

@@ -208,7 +208,8 @@ class Revolved(Levelled, Body):
         for k in range(last):
             w, r = self._profile[k].end
             turn = _turn(self._profile[k].tangent(np.ones(1))[0], self._profile[k + 1].tangent(np.zeros(1))[0])
-            points = self._ring(w, r, 360)
+            phi = ring_angles(360, self._stretch)
+            points = self._placed(np.stack([r * np.cos(phi), r * np.sin(phi), np.full(360, w)], axis=-1))
             points = np.concatenate([points, points[:1]])
             kind: Literal["edge", "joint", "seam"] = "edge" if abs(turn) > SMALLEST else "joint"
             if kind == "joint" and self._goes_on(k):
@@ -227,10 +228,6 @@ class Revolved(Levelled, Body):
         a, b = (piece.gradient(points) for piece in self.pieces[k : k + 2])
         across = np.linalg.norm(np.cross(a, b), axis=-1)
         return float(np.max(np.arctan2(across, np.sum(a * b, axis=-1))))
-
-    def _ring(self, w: float, r: float, n: int) -> FloatArray:
-        phi = ring_angles(n, self._stretch)
-        return self._placed(np.stack([r * np.cos(phi), r * np.sin(phi), np.full(n, w)], axis=-1))
 
     def tiles(self, edge: float) -> tuple[FloatArray, FloatArray, IntArray]:
         """The body as triangles with sides of about ``edge``, L, at most, in rings about the axis.
@@ -256,9 +253,12 @@ class Revolved(Levelled, Body):
         side = 0.75 * edge
         corners, normals, pieces = [], [], []
         for number, segment in enumerate(self._profile):
-            u = _steps(segment, side)
+            # values of u at equal steps of the length
+            u = _evenly(np.linalg.norm(np.diff(segment.point(np.linspace(0, 1, DENSE)), axis=0), axis=1), side)
             (w, r), (tw, tr) = segment.point(u).T, segment.tangent(u).T
-            sizes = ring_sizes(r, side, self._stretch)
+            # points on the rings; one where the radius is 0
+            length = r * _ring_length(self._stretch)[1][-1]
+            sizes = np.where(r > 0, np.maximum(6, np.ceil(length / side)), 1).astype(np.int64)
             for k in range(len(u) - 1):
                 ring, of_ring = strip(int(sizes[k]), int(sizes[k + 1]))
                 angles = [ring_angles(int(n), self._stretch) for n in sizes[k : k + 2]]
@@ -267,7 +267,11 @@ class Revolved(Levelled, Body):
                 x = np.stack([r[at] * np.cos(phi), r[at] * np.sin(phi), w[at]], axis=-1)
                 corners.append(self._placed(x))
                 # the apex of a fan has no angle of its own
-                phi = _towards(phi, sizes[at])
+                # angles (m, 3) of corners, of an apex the angle of the middle of the other two
+                apex = sizes[at] == 1
+                other = np.where(apex, 0.0, 1.0)
+                middle = np.arctan2(np.sum(other * np.sin(phi), axis=-1), np.sum(other * np.cos(phi), axis=-1))
+                phi = np.where(apex, middle[:, None], phi)
                 n = np.stack([tw[at] * np.cos(phi), tw[at] * np.sin(phi), -tr[at]], axis=-1)
                 normals.append(self._normal(n))
                 pieces.append(np.full(len(x), number, dtype=np.int64))
@@ -314,19 +318,6 @@ def _turn(before: FloatArray, after: FloatArray) -> float:
     return math.atan2(before[0] * after[1] - before[1] * after[0], before @ after)
 
 
-def _steps(segment: Segment, step: float) -> FloatArray:
-    """Values of u at equal steps of the length, of at most ``step``, L."""
-    return _evenly(np.linalg.norm(np.diff(segment.point(np.linspace(0, 1, DENSE)), axis=0), axis=1), step)
-
-
-def _towards(phi: FloatArray, sizes: IntArray) -> FloatArray:
-    """Angles (m, 3) of corners, of an apex the angle of the middle of the other two."""
-    apex = sizes == 1
-    other = np.where(apex, 0.0, 1.0)
-    middle = np.arctan2(np.sum(other * np.sin(phi), axis=-1), np.sum(other * np.cos(phi), axis=-1))
-    return np.where(apex, middle[:, None], phi)
-
-
 @cache
 def _ring_length(stretch: float) -> tuple[FloatArray, FloatArray]:
     """Angles in [0, 2 pi] and the length of the ring of radius 1 up to there."""
@@ -340,12 +331,6 @@ def ring_angles(n: int, stretch: float) -> FloatArray:
     """Angles (n,), radians, that divide a ring into parts of equal length."""
     angles, lengths = _ring_length(stretch)
     return np.asarray(np.interp(np.arange(n) * (lengths[-1] / n), lengths, angles))
-
-
-def ring_sizes(radii: FloatArray, edge: float, stretch: float) -> IntArray:
-    """Points on rings of these radii (n,), L, for parts of at most ``edge``, L; one where the radius is 0."""
-    length = radii * _ring_length(stretch)[1][-1]
-    return np.where(radii > 0, np.maximum(6, np.ceil(length / edge)), 1).astype(np.int64)
 
 
 def strip(lower: int, upper: int) -> tuple[IntArray, IntArray]:

@@ -120,15 +120,6 @@ def kinks(compiled: Compiled, points: FloatArray, spacing: float, size: float) -
     return at[bad], most[bad]
 
 
-def refuse_kinks(places: FloatArray, bends: FloatArray) -> None:
-    """ValueError if there is one of `kinks`."""
-    if len(places):
-        raise ValueError(
-            f"F = 0 is not smooth: its curvature has no bound near {tuple(places[np.argmax(bends)].round(6).tolist())} "
-            f"({len(places)} searches); an edge or a pole of F there: round it off in F"
-        )
-
-
 def distinct(places: FloatArray, bends: FloatArray, size: float) -> FloatArray:
     """One of the places (m, 3), L, from each group 1e-4 diagonals wide, that with the largest bend (m,)."""
     left, found = np.argsort(-bends), []

@@ -244,14 +244,6 @@ def curvatures(
     return np.concatenate([form[0, 0], form[1, 1]]), gauss, slope
 
 
-def principal_curvatures(spline: TensorSpline, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Principal curvatures (n, 2) and K (n,) at points brought onto the spline."""
-    kappa, gauss, _ = curvatures(spline, points)
-    mean = kappa.reshape(2, -1).mean(axis=0)
-    half = np.sqrt(np.maximum(mean**2 - gauss, 0.0))
-    return np.stack([mean - half, mean + half], axis=1), gauss
-
-
 def normal_curvatures(spline: TensorSpline, points: FloatArray, along: FloatArray) -> FloatArray:
     """kappa_n (n,) at points brought onto the spline, along directions (n, 3) that lie nearly on it."""
     return curvatures(spline, points, along)[0][: len(points)]

@@ -118,47 +118,6 @@ def _grown(
     return None if sheet is None or held.sum() < fewest else (sheet, held)
 
 
-def with_narrow(
-    vertices: FloatArray, triangles: IntArray, ends: IntArray, held: BoolArray, sheets: list[Sheet], close: Closeness
-) -> tuple[list[Sheet], BoolArray]:
-    """Sheets with those through parts so narrow that no vertex of theirs is clean."""
-    left = np.asarray(~held.any(axis=1))
-    if not left.any():
-        return sheets, held
-    label, normals = _parts(len(vertices), ends, left), angle_weighted_normals(vertices, triangles)
-    for part in np.unique(label[left]):
-        some = np.flatnonzero(left & (label == part))
-        patch = polynomial_patch(vertices[some], normals[some], close)
-        if patch is not None:
-            sheet = Sheet(patch, vertices[some], close)
-            sheets, held = [*sheets, sheet], np.column_stack([held, _on(sheet, vertices, ends, int(some[0]))])
-    return sheets, held
-
-
-def with_between(
-    vertices: FloatArray, triangles: IntArray, held: BoolArray, sheets: list[Sheet], open_: BoolArray, close: Closeness
-) -> tuple[list[Sheet], BoolArray]:
-    """Sheets with those through triangles at edges (e,) whose ends no sheet and no joint connects."""
-    edges = edges_of(triangles)
-    lost = np.flatnonzero(open_[edges.number].reshape(-1, 3).any(axis=1))
-    place = np.full(len(triangles), -1)
-    place[lost] = np.arange(len(lost))
-    joined = place[edges.sides // 3]
-    joined = joined[np.all(joined >= 0, axis=1)]
-    label = components(len(lost), joined[:, 0], joined[:, 1])[1]
-    more = []
-    for part in range(int(label.max()) + 1):
-        used, local = np.unique(triangles[lost[label == part]], return_inverse=True)
-        x = vertices[used]
-        patch = polynomial_patch(x, angle_weighted_normals(x, local.reshape(-1, 3)), close)
-        if patch is not None:
-            sheets = [*sheets, Sheet(patch, x, close)]
-            mine = np.zeros(len(vertices), dtype=bool)
-            mine[used] = True
-            more.append(mine)
-    return sheets, np.column_stack([held, *more])
-
-
 def _on(sheet: Sheet, vertices: FloatArray, ends: IntArray, seed: int) -> BoolArray:
     """Vertices (n,) that a sheet holds, joined to one of them."""
     on = np.asarray(sheet.off(vertices) <= sheet.tolerance)
@@ -214,17 +173,34 @@ def jointed(
     """
     size = 0.5 * float(np.linalg.norm(np.ptp(vertices, axis=0)))
     close = Closeness.of(size, noise)
-    ends = edges_of(triangles).ends
+    edges = edges_of(triangles)
+    ends = edges.ends
     sheets, held = sheets_of(vertices, normals, ends, clean, size, noise)
     if not sheets:
         return None
-    sheets, held = with_narrow(vertices, triangles, ends, held, sheets, close)
+    left = np.asarray(~held.any(axis=1))
+    # parts so narrow that no vertex of theirs is clean
+    label, around = _parts(len(vertices), ends, left), angle_weighted_normals(vertices, triangles)
+    for number in np.unique(label[left]):
+        part = np.flatnonzero(left & (label == number))
+        patch = polynomial_patch(vertices[part], around[part], close)
+        if patch is not None:
+            sheets = [*sheets, Sheet(patch, vertices[part], close)]
+            held = np.column_stack([held, _on(sheets[-1], vertices, ends, int(part[0]))])
     if not held.any(axis=1).all():
         return None
     found = _placed(vertices, ends, held, sheets)
     if found.open.any():
-        # of long triangles from joint to joint no vertex is clean
-        sheets, held = with_between(vertices, triangles, held, sheets, found.open, close)
+        # of long triangles from joint to joint no vertex is clean: those at edges whose ends nothing connects
+        lost, beside = np.any(found.open[edges.number].reshape(-1, 3), axis=1), edges.sides // 3
+        label = components(len(triangles), *beside[lost[beside].all(axis=1)].T)[1]
+        for number in np.unique(label[lost]):
+            used, local = np.unique(triangles[lost & (label == number)], return_inverse=True)
+            x = vertices[used]
+            patch = polynomial_patch(x, angle_weighted_normals(x, local.reshape(-1, 3)), close)
+            if patch is not None:
+                sheets = [*sheets, Sheet(patch, x, close)]
+                held = np.column_stack([held, np.isin(np.arange(len(vertices)), used)])
         found = _placed(vertices, ends, held, sheets)
     if found.open.any() or len(sheets) < 2:
         return None
@@ -263,7 +239,17 @@ def _placed(vertices: FloatArray, ends: IntArray, held: BoolArray, sheets: list[
     done = np.zeros(len(ends), dtype=bool)
     for i, j in np.argwhere(np.triu(meets > 0, 1)).tolist():
         edge, a, b, where, x = _across(sheets[i], sheets[j], vertices, ends, held[:, i], held[:, j])
-        _take_sides(held, points, (i, j), (a, b), where, x)
+        # vertices at edges across the joint go to the sheet of their side, or are moved onto it, where both hold them
+        ahead = np.concatenate([where, where - 1.0])
+        order = np.argsort(np.abs(ahead), kind="stable")
+        vertex, nearest = np.unique(np.concatenate([a, b])[order], return_index=True)
+        ahead = ahead[order[nearest]]
+        # near in parts of the edge, rather than that slivers are cut off
+        on = np.abs(ahead) < 0.1
+        points[vertex[on]] = x[order[nearest] % len(where)][on]
+        held[np.ix_(vertex[on], (i, j))] = True
+        both = held[vertex, i] & held[vertex, j] & ~on
+        held[vertex[both], np.where(ahead[both] > 0, j, i)] = False
         apart = ~np.any(held[a] & held[b], axis=1) & held[a, i] & held[b, j] & (np.abs(where - 0.5) < 0.5)
         apart &= ~done[edge]
         done[edge[apart]] = True
@@ -325,27 +311,6 @@ def _across(
     found &= np.abs(np.sum(first.normals(x) * second.normals(x), axis=1) - 1) < SMOOTH**2
     found &= np.linalg.norm(x - start, axis=1) < 3 * length
     return mine[found], a[found], b[found], high[found], x[found]
-
-
-def _take_sides(
-    held: BoolArray,
-    points: FloatArray,
-    pair: tuple[int, int],
-    ends: tuple[IntArray, IntArray],
-    where: FloatArray,
-    x: FloatArray,
-) -> None:
-    """Vertices at edges across a joint given to the sheet of their side, or moved onto it, where both hold them."""
-    vertex, ahead = np.concatenate(ends), np.concatenate([where, where - 1.0])
-    order = np.argsort(np.abs(ahead), kind="stable")
-    vertex, nearest = np.unique(vertex[order], return_index=True)
-    ahead, x = ahead[order[nearest]], x[order[nearest] % len(where)]
-    # near in parts of the edge, rather than that slivers are cut off
-    on = np.abs(ahead) < 0.1
-    points[vertex[on]] = x[on]
-    held[np.ix_(vertex[on], pair)] = True
-    both = held[vertex, pair[0]] & held[vertex, pair[1]] & ~on
-    held[vertex[both], np.where(ahead[both] > 0, pair[1], pair[0])] = False
 
 
 def _labelled(

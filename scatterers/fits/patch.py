@@ -143,7 +143,14 @@ def polynomial_through(
     x = (points - middle) / half
     for kind, degree in (("plane", 1), ("quadric", 2)):
         powers = [(a, b, c) for a in range(3) for b in range(3) for c in range(3) if a + b + c <= degree]
-        value, slope = _monomials(x, powers)
+        # monomials (n, p) and their gradients (n, p, 3)
+        exponent = np.array(powers)
+        value = np.prod(x[:, None] ** exponent, axis=-1)
+        slope = np.empty((*value.shape, 3))
+        for axis in range(3):
+            lower = exponent.copy()
+            lower[:, axis] = np.maximum(lower[:, axis] - 1, 0)
+            slope[..., axis] = exponent[:, axis] * np.prod(x[:, None] ** lower, axis=-1)
         if len(x) * 3 < len(powers):
             continue
         q = _least(value, slope, normals)
@@ -154,7 +161,9 @@ def polynomial_through(
         lean = np.sum(g * normals, axis=1) / np.maximum(steep, 1e-300)
         if np.median(lean) < 0:
             f, g, lean, q = -f, -g, -lean, -q
-        bend = _bend(q, powers)
+        # size of the second derivatives of Q, in the variables of the monomials
+        second = np.array([[2.0 if 2 in p else 1.0] for p in powers]) * (np.sum(powers, axis=1) == 2)[:, None]
+        bend = float(np.linalg.norm(q[:, None] * second))
         off = second_order(f, steep, bend) * half
         # a quadric may be a pair of sheets, of which the points take one
         curved = 2e-4 * bend / float(np.median(steep)) * half / 8 if kind == "quadric" else 0.0
@@ -194,24 +203,6 @@ def tip_of(patch: Patch) -> FloatArray | None:
     # Q = 0 is a cone or nearly one: its sheets come as near as that to the tip
     gap = np.sqrt(2 * abs(float(spline.level(tip[None])[0])) / strength.max())
     return tip if gap < TIP * float(spline.spacing[0]) else None
-
-
-def _bend(q: FloatArray, powers: list[tuple[int, int, int]]) -> float:
-    """Size of the second derivatives of Q, in the variables of the monomials."""
-    second = np.array([[2.0 if 2 in p else 1.0] for p in powers]) * (np.sum(powers, axis=1) == 2)[:, None]
-    return float(np.linalg.norm(q[:, None] * second))
-
-
-def _monomials(x: FloatArray, powers: list[tuple[int, int, int]]) -> tuple[FloatArray, FloatArray]:
-    """Monomials (n, p) and their gradients (n, p, 3)."""
-    exponent = np.array(powers)
-    value = np.prod(x[:, None] ** exponent, axis=-1)
-    slope = np.empty((*value.shape, 3))
-    for axis in range(3):
-        lower = exponent.copy()
-        lower[:, axis] = np.maximum(lower[:, axis] - 1, 0)
-        slope[..., axis] = exponent[:, axis] * np.prod(x[:, None] ** lower, axis=-1)
-    return value, slope
 
 
 def _as_spline(q: FloatArray, powers: list[tuple[int, int, int]], middle: FloatArray, half: float) -> TensorSpline:

@@ -97,7 +97,12 @@ def fitted_pieces(cloud: PieceCloud, progress: Callable[[str], None]) -> Fit:
     for number in range(count):
         progress(f"piece {number + 1} of {count}")
         own = np.flatnonzero(piece == number)
-        members = _grown(piece, number, cloud.regions)
+        # triangles of a piece and those of its region in four rings about it
+        inside = piece == number
+        for _ in range(4):
+            touching = inside[cloud.regions.joined]
+            inside[cloud.regions.joined[touching.any(axis=1)].ravel()] = True
+        members = np.flatnonzero(inside)
         patch, corner_normals = _patch(cloud, members, own, close)
         patches.append(patch)
         at_corners[own] = corner_normals
@@ -255,15 +260,6 @@ def _by_axis(own: IntArray, normal: FloatArray, regions: Regions) -> IntArray:
             break
         label = np.array([into.get(k, k) for k in label.tolist()])
     return np.asarray(np.unique(label, return_inverse=True)[1].ravel(), dtype=np.int64)
-
-
-def _grown(piece: IntArray, number: int, regions: Regions) -> IntArray:
-    """Triangles of a piece and those of its region in four rings about it."""
-    inside = piece == number
-    for _ in range(4):
-        touching = inside[regions.joined]
-        inside[regions.joined[touching.any(axis=1)].ravel()] = True
-    return np.flatnonzero(inside)
 
 
 def _spacing(corners: FloatArray) -> float:

@@ -151,18 +151,14 @@ def piece_space(
         if key not in known:
             known[key] = _program(*key)
         programs[where] = known[key]
-    return PieceSpace(splines, _table(origin, side, shape, programs, _followed(occupied, shape)))
-
-
-def _followed(occupied: IntArray, shape: IntArray) -> IntArray:
-    """Row of the nearest of the voxels with points, whose numbers rise, for every voxel."""
+    # row of the nearest of the voxels with points, whose numbers rise, for every voxel
     from scipy.ndimage import distance_transform_edt
 
     row = np.full(shape, -1)
     row.ravel()[occupied] = np.arange(len(occupied))
     # a tree is slow in the middle of a ball or box, from where much is about as far
     near = distance_transform_edt(row < 0, return_distances=False, return_indices=True)
-    return np.asarray(row[tuple(near)].ravel())
+    return PieceSpace(splines, _table(origin, side, shape, programs, np.asarray(row[tuple(near)].ravel())))
 
 
 def _near(

@@ -24,7 +24,6 @@ from scatterers.fits.cloud import (
     left_at,
     normal_curvatures,
     not_followed,
-    principal_curvatures,
     rms,
 )
 from scatterers.fits.solver import COARSER, MAX_NODES, SLOPES, SMOOTHING, Fitted, fit, spacing_of
@@ -252,7 +251,11 @@ def _shared(cloud: PointCloud, fine: Fitted, rms_kappa: float) -> tuple[float, f
     """
     if cloud.nearer is not None:
         source = cloud.nearer.source
-        return unseen(source, _turns(source, fine), *principal_curvatures(fine.spline, source.vertices))
+        # principal curvatures (n, 2) and K (n,) at points brought onto the spline
+        kappa, gauss, _ = curvatures(fine.spline, source.vertices)
+        mean = kappa.reshape(2, -1).mean(axis=0)
+        half = np.sqrt(np.maximum(mean**2 - gauss, 0.0))
+        return unseen(source, _turns(source, fine), np.stack([mean - half, mean + half], axis=1), gauss)
     if cloud.noise or np.isfinite(cloud.uncertain):
         return 0.0, 0.0
     shared = fine.turn / fine.spacing

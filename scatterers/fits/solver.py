@@ -215,8 +215,27 @@ class _Equations:
         self.samples = [places, *(np.ascontiguousarray((places + k * self.sorted_normals)[some]) for k in (1, -1))]
         self.nothing, self.flat = np.zeros(len(places)), np.zeros_like(places)
         self.targets = [self.nothing, *(self._offset_targets(k) for k in (1, -1))]
-        self.unknown = self._seen()
-        density = self._density()
+        # coefficients that some sample sees
+        from scipy.ndimage import binary_dilation
+
+        seen = np.zeros(self.shape, dtype=bool)
+        for places in self.samples:
+            seen[tuple(places.astype(np.int64).T)] = True
+        # a sample of cell k sees coefficients k..k + 5
+        self.unknown = np.asarray(binary_dilation(seen, np.ones((6, 6, 6)), origin=(-3, -3, -3)))
+        # weights of the samples about each node, by hats three cells wide
+        size = int(np.prod(self.shape))
+        strides = np.array([self.shape[1] * self.shape[2], self.shape[2], 1])
+        total = np.zeros(size)
+        for weight, places in zip(
+            (1 + 3 * self.normal_weight, OFFSET_WEIGHT, OFFSET_WEIGHT), self.samples, strict=True
+        ):
+            nearest = np.rint(places).astype(np.int64)
+            for shift in np.ndindex(3, 3, 3):
+                node = nearest + np.array(shift) - 1
+                hat = weight * np.prod(1 - np.abs(places - node) / 1.5, axis=1)
+                total += np.bincount((node + 2) @ strides, np.maximum(hat, 0.0), minlength=size)
+        density = total.reshape(self.shape)
         # a floor: what the equations leave nearly free must not dominate the steps
         self.damping = 1 / (density + 0.03 * density.max() + 3 * ROUGHNESS.max() * smoothing)
 
@@ -321,31 +340,6 @@ class _Equations:
         """S D^-1 S r on the unknown coefficients."""
         values = cardinal(cardinal(r[:-OVERREAD].reshape(self.shape)) * self.damping) * self.unknown
         return np.concatenate([values.ravel(), np.zeros(OVERREAD)])
-
-    def _seen(self) -> BoolArray:
-        """Coefficients that some sample sees."""
-        from scipy.ndimage import binary_dilation
-
-        seen = np.zeros(self.shape, dtype=bool)
-        for places in self.samples:
-            seen[tuple(places.astype(np.int64).T)] = True
-        # a sample of cell k sees coefficients k..k + 5
-        return np.asarray(binary_dilation(seen, np.ones((6, 6, 6)), origin=(-3, -3, -3)))
-
-    def _density(self) -> FloatArray:
-        """Weights of the samples about each node, by hats three cells wide."""
-        size = int(np.prod(self.shape))
-        strides = np.array([self.shape[1] * self.shape[2], self.shape[2], 1])
-        total = np.zeros(size)
-        for weight, places in zip(
-            (1 + 3 * self.normal_weight, OFFSET_WEIGHT, OFFSET_WEIGHT), self.samples, strict=True
-        ):
-            nearest = np.rint(places).astype(np.int64)
-            for shift in np.ndindex(3, 3, 3):
-                node = nearest + np.array(shift) - 1
-                hat = weight * np.prod(1 - np.abs(places - node) / 1.5, axis=1)
-                total += np.bincount((node + 2) @ strides, np.maximum(hat, 0.0), minlength=size)
-        return total.reshape(self.shape)
 
     def spline(self, c: FloatArray) -> TensorSpline:
         values = np.ascontiguousarray(c[:-OVERREAD].reshape(self.shape)) * self.spacing

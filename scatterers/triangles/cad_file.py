@@ -140,8 +140,25 @@ def read_cad(path: Path, reading: CadReading, *, curved: int = 0, progress: Call
     edges = edges_of(mesh.triangles)
     creases, level, turns = _creases(mesh, edges, of, corners)
     jumps = curvature_jumps(mesh.vertices, mesh.triangles, of, corners, level)
-    texts = _edge_texts(edges, of, creases, turns)
-    normals = _vertex_normals(mesh, corners, there)
+    # the creases in words, those with most points first
+    at = np.flatnonzero(creases & (turns > SHARP))
+    pairs, which = np.unique(np.sort(of[edges.sides[at] // 3], axis=1), axis=0, return_inverse=True)
+    found = []
+    for k, (first, second) in enumerate(pairs.tolist()):
+        mine = at[which.ravel() == k]
+        count = len(np.unique(edges.ends[mine]))
+        angle = np.max(turns[mine])
+        found.append((count, f"edge between faces {first} and {second}: {angle:.0f} deg at {count} points"))
+    texts = tuple(text for _, text in sorted(found, key=lambda row: -row[0]))
+    # mean of the faces' normals at each vertex (n, 3), NaN where no face has one that agrees with the triangles
+    total = np.zeros((len(mesh.vertices), 3))
+    np.add.at(total, mesh.triangles[there], corners[there])
+    with np.errstate(invalid="ignore"):
+        mean = total / np.linalg.norm(total, axis=1, keepdims=True)
+    along = np.sum(mean * angle_weighted_normals(mesh.vertices, mesh.triangles), axis=1)
+    # at a pole of its parameters a face has none
+    mean[~(along > np.cos(np.radians(20.0)))] = np.nan
+    normals = np.asarray(mean)
     return CadPoints(mesh, normals, corners, creases, level, jumps, texts)
 
 
@@ -261,22 +278,18 @@ def _stated(path: Path, kind: str) -> str | None:
     if kind == "IGES":
         globals_ = "".join(line[:72] for line in text.splitlines() if line[72:73] == "G")
         # strings are nH...; their commas do not separate
-        fields = re.split(r"[,;]", _without_strings(globals_))
+        # global section of an IGES file with its Hollerith strings emptied
+        out, k = "", 0
+        for found in re.finditer(r"(\d+)H", globals_):
+            if found.start() < k:
+                continue
+            out += globals_[k : found.start()]
+            k = found.end() + int(found[1])
+        fields = re.split(r"[,;]", out + globals_[k:])
         with_flag = fields[13].strip() if len(fields) > 13 else ""
         by_flag = {1: "in", 2: "mm", 4: "ft", 6: "m", 7: "km", 9: "um", 10: "cm"}
         return by_flag.get(int(with_flag)) if with_flag.isdigit() else None
     return None
-
-
-def _without_strings(text: str) -> str:
-    """Global section of an IGES file with its Hollerith strings emptied."""
-    out, k = "", 0
-    for found in re.finditer(r"(\d+)H", text):
-        if found.start() < k:
-            continue
-        out += text[k : found.start()]
-        k = found.end() + int(found[1])
-    return out + text[k:]
 
 
 def _meshed(path: Path, points: int, sew: float | None, curved: int) -> dict[str, Any]:
@@ -368,31 +381,6 @@ def _creases(
     if lost.any():
         sharp = np.where(lost, regions_of(mesh.vertices, mesh.triangles).crease, sharp)
     return sharp, between & ~sharp & ~lost, turns
-
-
-def _vertex_normals(mesh: TriangleMesh, corners: FloatArray, known: BoolArray) -> FloatArray:
-    """Mean of the faces' normals at each vertex (n, 3), NaN where no face has one that agrees with the triangles."""
-    total = np.zeros((len(mesh.vertices), 3))
-    np.add.at(total, mesh.triangles[known], corners[known])
-    with np.errstate(invalid="ignore"):
-        mean = total / np.linalg.norm(total, axis=1, keepdims=True)
-    along = np.sum(mean * angle_weighted_normals(mesh.vertices, mesh.triangles), axis=1)
-    # at a pole of its parameters a face has none
-    mean[~(along > np.cos(np.radians(20.0)))] = np.nan
-    return np.asarray(mean)
-
-
-def _edge_texts(edges: Edges, of: IntArray, creases: BoolArray, turns: FloatArray) -> tuple[str, ...]:
-    """The creases in words, those with most points first."""
-    at = np.flatnonzero(creases & (turns > SHARP))
-    pairs, which = np.unique(np.sort(of[edges.sides[at] // 3], axis=1), axis=0, return_inverse=True)
-    found = []
-    for k, (first, second) in enumerate(pairs.tolist()):
-        mine = at[which.ravel() == k]
-        count = len(np.unique(edges.ends[mine]))
-        angle = np.max(turns[mine])
-        found.append((count, f"edge between faces {first} and {second}: {angle:.0f} deg at {count} points"))
-    return tuple(text for _, text in sorted(found, key=lambda row: -row[0]))
 
 
 def cleaned_apart(

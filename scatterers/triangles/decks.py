@@ -240,7 +240,14 @@ def understood(name: str, suffix: str, data: bytes, limit: int, note: Note) -> t
         rb"(\0[\t\n\r -~]){16}": "utf-16-be",
     }
     if data.startswith(b"\x1f\x8b"):
-        data, suffix = _unpacked(name, data, limit), Path(name.lower().removesuffix(".gz")).suffix
+        try:
+            with gzip.open(io.BytesIO(data)) as stream:
+                found = stream.read(limit + 1)
+        except (OSError, EOFError, zlib.error) as error:
+            raise ValueError(f"{name} cannot be unpacked: {error}; pack it again") from None
+        if len(found) > limit:
+            raise ValueError(f"{name} unpacks to more than {limit / 2**20:.0f} MB; thin it out")
+        data, suffix = found, Path(name.lower().removesuffix(".gz")).suffix
     if encoding := next((code for sign, code in utf16.items() if re.match(sign, data)), None):
         data = data.decode(encoding, "replace").encode()
     data = data.removeprefix(b"\xef\xbb\xbf")
@@ -278,17 +285,6 @@ def what_kind(name: str, suffix: str, data: bytes) -> str:
 def what_else(data: bytes) -> str | None:
     """What a file is that is no mesh, and what to do about it; None if it is not known."""
     return next((what for sign, what in OTHERS.items() if re.match(sign, data[:HEAD], re.IGNORECASE)), None)
-
-
-def _unpacked(name: str, data: bytes, limit: int) -> bytes:
-    try:
-        with gzip.open(io.BytesIO(data)) as stream:
-            found = stream.read(limit + 1)
-    except (OSError, EOFError, zlib.error) as error:
-        raise ValueError(f"{name} cannot be unpacked: {error}; pack it again") from None
-    if len(found) > limit:
-        raise ValueError(f"{name} unpacks to more than {limit / 2**20:.0f} MB; thin it out")
-    return found
 
 
 def _whole_stl(name: str, data: bytes, note: Note) -> bytes:

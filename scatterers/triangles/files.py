@@ -106,7 +106,27 @@ def read_mesh(
     scale = UNITS[_unit(raw, units, "m" if in_memory else None)]
     chosen = _named(raw, choice.part)
     try:
-        vertices, triangles, offset, local = _one_body(raw, chosen, choice, scale, note)
+        # vertices and triangles of a closed surface, the middle of its box, and the vertices relative to that
+        vertices, triangles = cleaned(raw.name, raw.vertices, chosen, note if raw.indexed else silent, note)
+        size = float(np.ptp(vertices, axis=0).max()) * scale
+        if not 1e-9 <= size <= 1e9:
+            raise ValueError(f"{raw.name} is {size:.3g} m large; give the right units, or a body from 1e-09 to 1e+09 m")
+        vertices, triangles = whole_body(
+            raw.name, vertices, triangles, choice, scale, note, named=chosen is not raw.triangles
+        )
+        # digits are lost to the offset in any sum of products of coordinates, so it goes first
+        offset = 0.5 * (vertices.min(0) + vertices.max(0))
+        local = vertices - offset
+        if choice.every and choice.part is None:
+            local, triangles = every_part(raw.name, local, triangles, note)
+            vertices = local + offset
+        else:
+            triangles = oriented(raw.name, local, triangles, note)
+        _check_rounding(raw.name, vertices, triangles)
+        if choice.cap is not None:
+            local, triangles = uncrossed(raw.name, local, triangles, choice.cap, scale, note)
+            vertices = local + offset
+        _check_crossings(raw.name, local, triangles, offset * scale, scale, cut=choice.cap is not None)
     except ValueError:
         # rounding tears a surface and folds it
         _check_rounding(raw.name, raw.vertices, chosen, torn=True)
@@ -119,33 +139,6 @@ def read_mesh(
         )
         vertices = local
     return TriangleMesh(vertices * scale, triangles, tuple(repairs))
-
-
-def _one_body(
-    raw: _Raw, chosen: IntArray, choice: Choice, scale: float, note: Callable[[str], None]
-) -> tuple[FloatArray, IntArray, FloatArray, FloatArray]:
-    """Vertices and triangles of a closed surface, the middle of its box, and the vertices relative to that."""
-    vertices, triangles = cleaned(raw.name, raw.vertices, chosen, note if raw.indexed else silent, note)
-    size = float(np.ptp(vertices, axis=0).max()) * scale
-    if not 1e-9 <= size <= 1e9:
-        raise ValueError(f"{raw.name} is {size:.3g} m large; give the right units, or a body from 1e-09 to 1e+09 m")
-    vertices, triangles = whole_body(
-        raw.name, vertices, triangles, choice, scale, note, named=chosen is not raw.triangles
-    )
-    # digits are lost to the offset in any sum of products of coordinates, so it goes first
-    offset = 0.5 * (vertices.min(0) + vertices.max(0))
-    local = vertices - offset
-    if choice.every and choice.part is None:
-        local, triangles = every_part(raw.name, local, triangles, note)
-        vertices = local + offset
-    else:
-        triangles = oriented(raw.name, local, triangles, note)
-    _check_rounding(raw.name, vertices, triangles)
-    if choice.cap is not None:
-        local, triangles = uncrossed(raw.name, local, triangles, choice.cap, scale, note)
-        vertices = local + offset
-    _check_crossings(raw.name, local, triangles, offset * scale, scale, cut=choice.cap is not None)
-    return vertices, triangles, offset, local
 
 
 def _named(raw: _Raw, part: str | int | None) -> IntArray:

@@ -289,7 +289,15 @@ class _Model:
             case "component" | "item" as kind:
                 if any(name.endswith("path") for name in attributes):
                     raise ValueError("it refers to objects in other parts of the archive; export one body as one part")
-                placed = (attributes["objectid"], _matrix(attributes.get("transform")))
+                # row-vector transform (4, 4)
+                text = attributes.get("transform")
+                matrix = np.eye(4)
+                if text is not None:
+                    numbers = [float(number) for number in text.split()]
+                    if len(numbers) != 12:
+                        raise ValueError(f"a transform of {len(numbers)} numbers instead of 12")
+                    matrix[:, :3] = np.reshape(numbers, (4, 3))
+                placed = (attributes["objectid"], matrix)
                 (self.items if kind == "item" else self.components[self.object]).append(placed)
 
     def placed(self) -> Iterator[Placed]:
@@ -336,17 +344,6 @@ def assembled(parts: Iterable[Placed], most: int) -> tuple[FloatArray, IntArray,
         names.append((name, len(corners)))
         count += len(points)
     return np.concatenate(vertices), np.concatenate(triangles), tuple(names)
-
-
-def _matrix(text: str | None) -> FloatArray:
-    """Row-vector transform (4, 4)."""
-    matrix = np.eye(4)
-    if text is not None:
-        numbers = [float(number) for number in text.split()]
-        if len(numbers) != 12:
-            raise ValueError(f"a transform of {len(numbers)} numbers instead of 12")
-        matrix[:, :3] = np.reshape(numbers, (4, 3))
-    return matrix
 
 
 def with_triangles(data: bytes, most: int) -> bytes:

@@ -109,27 +109,11 @@ def osculating_jets(vertices: FloatArray, triangles: IntArray) -> Jets:
     near, counts = _neighbours(vertices, guess)
     corners = vertices[triangles]
     edge = float(np.mean(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)))
-    frames, radii, coefficients, residuals, lower = _fitted(vertices, guess, near, counts)
-    fitted = counts > 0
-    radii[~fitted], residuals[~fitted] = edge, edge
-    normals, principal = _curvatures(frames, radii, coefficients)
-    normals4, principal4 = _curvatures(frames, radii, lower)
-    tilt = np.where(fitted, np.linalg.norm(normals4 - normals, axis=1), 1.0)
-    return Jets(fitted, normals, principal, principal4, residuals, tilt, frames, radii, coefficients)
-
-
-def _fitted(
-    vertices: FloatArray, normals: FloatArray, near: IntArray, counts: IntArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Frames, radii, coefficients, residuals and coefficients of degree 4, as `Jets` has them.
-
-    Fitted twice: frames of the second time have the normals of the first. Of ``counts`` neighbours the first
-    `NEIGHBOURS` are taken, and more by a quarter while these leave a term open.
-    """
+    # frames, radii, coefficients, residuals and coefficients of degree 4, as `Jets` has them
     # terms of degree 2, 4 and 6, and less
     degrees = (5, 14, 27)
     n, terms = len(vertices), len(POWERS)
-    frames, radii, residuals = _frames(normals), np.empty(n), np.empty((n, 3))
+    frames, radii, residuals = _frames(guess), np.empty(n), np.empty((n, 3))
     coefficients, lower = np.zeros((n, terms)), np.zeros((n, terms))
     count, times = np.minimum(counts, NEIGHBOURS), np.where(counts > 0, 0, 2)
     # rows below the data bound combinations of terms, of size 1, that the points leave open: of none of slopes and
@@ -164,7 +148,12 @@ def _fitted(
         residuals[done] *= radii[done, None]
         first = done[times[done] == 1]
         frames[first] = _frames(_curvatures(frames[first], radii[first], coefficients[first])[0])
-    return frames, radii, coefficients, residuals, lower
+    fitted = counts > 0
+    radii[~fitted], residuals[~fitted] = edge, edge
+    normals, principal = _curvatures(frames, radii, coefficients)
+    normals4, principal4 = _curvatures(frames, radii, lower)
+    tilt = np.where(fitted, np.linalg.norm(normals4 - normals, axis=1), 1.0)
+    return Jets(fitted, normals, principal, principal4, residuals, tilt, frames, radii, coefficients)
 
 
 def _frames(normals: FloatArray) -> FloatArray:

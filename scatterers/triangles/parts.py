@@ -116,31 +116,6 @@ def listed(vertices: FloatArray, triangles: IntArray, parts: IntArray, scale: fl
     return "; ".join(texts) + (f"; {rest} more" if rest > 0 else "")
 
 
-def chosen_part(
-    name: str, vertices: FloatArray, triangles: IntArray, part: str | int, scale: float, note: Note
-) -> tuple[FloatArray, IntArray]:
-    """Vertices and triangles of one part, by its number from 1, or the largest.
-
-    Raises
-    ------
-    ValueError
-        If there is no such part.
-    """
-    parts = parts_of(vertices, triangles)
-    count = int(parts.max()) + 1
-    number = 1 if part == "largest" else part
-    if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= count:
-        raise ValueError(
-            f'part = {part!r} is none of {name}; give "largest", or a number: '
-            f"{listed(vertices, triangles, parts, scale)}"
-        )
-    if count > 1:
-        left = triangles[parts != number - 1]
-        share = float(areas(vertices, left).sum()) / float(areas(vertices, triangles).sum())
-        note(f"part {number} of {count} of {name} taken; {100 * share:.2g} % of its area left out")
-    return compact(vertices, triangles[parts == number - 1])
-
-
 def compact(vertices: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
     """The same triangles and the vertices that they use."""
     used, corners = np.unique(triangles, return_inverse=True)

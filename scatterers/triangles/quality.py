@@ -30,7 +30,7 @@ import numpy as np
 
 from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.triangles.jets import Jets, angle_weighted_normals
-from scatterers.triangles.parts import capped, chosen_part, silent, taken_apart, united
+from scatterers.triangles.parts import areas, capped, compact, listed, parts_of, silent, taken_apart, united
 from scatterers.triangles.regions import FEWEST, SHARP
 from scatterers.triangles.topology import cleaned, edges_of, flat_normals, oriented
 
@@ -154,7 +154,15 @@ def assess(vertices: FloatArray, triangles: IntArray, jets: Jets) -> MeshQuality
     corners = vertices[triangles]
     length = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=-1)
     edge = float(length.mean())
-    ends, angles = _dihedrals(vertices, triangles)
+    # edges (k, 2) and the angles between their triangles (k,), degrees; small ones are left out
+    edges = edges_of(triangles)
+    normal, area = flat_normals(vertices[triangles])
+    left, right = edges.sides.T // 3
+    across = np.linalg.norm(np.cross(normal[left], normal[right]), axis=1)
+    angle = np.arctan2(across, np.sum(normal[left] * normal[right], axis=1))
+    # normals of slivers tell nothing
+    solid = np.minimum(area[left], area[right]) > 0.05 * np.median(area)
+    ends, angles = edges.ends[solid], np.degrees(angle[solid])
     curvature = np.abs(jets.principal).max(axis=1)
     doubt = _doubt(jets)
     astray = np.linalg.norm(jets.normals - angle_weighted_normals(vertices, triangles), axis=1)
@@ -163,7 +171,10 @@ def assess(vertices: FloatArray, triangles: IntArray, jets: Jets) -> MeshQuality
     second, fourth, sixth = np.maximum(jets.residuals, ROUNDING * edge).T
     ratio = sixth / second
     resolved = float(np.percentile(curvature, 99)) * edge
-    noise = _noise(fourth, sixth, curvature * edge) / edge
+    # noise of the vertices, as a length: what remains of res_6 when that of a smooth surface is taken off
+    decay = np.minimum(4 * (curvature * edge) ** 2, 0.5) ** 2
+    on4, on6 = RESIDUAL_PER_NOISE
+    noise = float(np.median(np.sqrt(np.maximum(sixth**2 - decay * fourth**2, 0) / (on6**2 - decay * on4**2)))) / edge
     jump = jumps_at(jets, edge)
     quality: dict[str, Any] = {
         "vertices": len(vertices),
@@ -184,7 +195,11 @@ def assess(vertices: FloatArray, triangles: IntArray, jets: Jets) -> MeshQuality
     }
     # of both ends of the edge that follows each corner
     far = np.minimum(jets.radii[triangles], jets.radii[np.roll(triangles, -1, axis=1)])
-    faults = {"rims": _rims(ends, angles, len(vertices)), "unseen": int(np.sum(length > 2 * far)) // 2}
+    # vertices at which at least two sharp edges meet, or 0 if most sharp edges stand alone, as those of slivers do
+    sharp = angles > SHARP
+    meeting = np.bincount(ends[sharp].ravel(), minlength=len(vertices))
+    chained = int(np.sum(meeting >= 2))
+    faults = {"rims": chained if 2 * chained > np.sum(meeting > 0) else 0, "unseen": int(np.sum(length > 2 * far)) // 2}
     verdict, reasons = _verdict(quality, jets, **faults)
     return MeshQuality(**quality, verdict=verdict, reasons=reasons)
 
@@ -245,36 +260,9 @@ def _verdict(quality: dict[str, Any], jets: Jets, *, rims: int, unseen: int) -> 
     return "smooth", f"no vertex is bad ({worst}, allowed {BAD}) and curvature times edge is {curvature:.2g}"
 
 
-def _noise(fourth: FloatArray, sixth: FloatArray, turn: FloatArray) -> float:
-    """Noise of the vertices, as a length: what remains of res_6 when that of a smooth surface is taken off."""
-    decay = np.minimum(4 * turn**2, 0.5) ** 2
-    on4, on6 = RESIDUAL_PER_NOISE
-    return float(np.median(np.sqrt(np.maximum(sixth**2 - decay * fourth**2, 0) / (on6**2 - decay * on4**2))))
-
-
 def noise_at_most(jets: Jets) -> float:
     """Noise of the vertices, L, if all that jets of degree 6 leave were noise."""
     return float(np.median(jets.residuals[:, 2])) / RESIDUAL_PER_NOISE[1]
-
-
-def _rims(ends: IntArray, angles: FloatArray, count: int) -> int:
-    """Vertices at which at least two sharp edges meet, or 0 if most sharp edges stand alone, as those of slivers do."""
-    sharp = angles > SHARP
-    meeting = np.bincount(ends[sharp].ravel(), minlength=count)
-    chained = int(np.sum(meeting >= 2))
-    return chained if 2 * chained > np.sum(meeting > 0) else 0
-
-
-def _dihedrals(vertices: FloatArray, triangles: IntArray) -> tuple[IntArray, FloatArray]:
-    """Edges (k, 2) and the angles between their triangles (k,), degrees; small ones are left out."""
-    edges = edges_of(triangles)
-    normal, area = flat_normals(vertices[triangles])
-    left, right = edges.sides.T // 3
-    across = np.linalg.norm(np.cross(normal[left], normal[right]), axis=1)
-    angle = np.arctan2(across, np.sum(normal[left] * normal[right], axis=1))
-    # normals of slivers tell nothing
-    solid = np.minimum(area[left], area[right]) > 0.05 * np.median(area)
-    return edges.ends[solid], np.degrees(angle[solid])
 
 
 @dataclass(frozen=True)
@@ -331,7 +319,20 @@ def whole_body(
     if choice.part is not None and not named:
         if isinstance(choice.part, str) and choice.part != "largest":
             raise ValueError(f'{name} has no part {choice.part!r}; give "largest" or a number from 1')
-        vertices, triangles = chosen_part(name, vertices, triangles, choice.part, scale, note)
+        # vertices and triangles of one part, by its number from 1, or the largest
+        parts = parts_of(vertices, triangles)
+        count = int(parts.max()) + 1
+        number = 1 if choice.part == "largest" else choice.part
+        if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= count:
+            raise ValueError(
+                f'part = {choice.part!r} is none of {name}; give "largest", or a number: '
+                f"{listed(vertices, triangles, parts, scale)}"
+            )
+        if count > 1:
+            left = triangles[parts != number - 1]
+            share = float(areas(vertices, left).sum()) / float(areas(vertices, triangles).sum())
+            note(f"part {number} of {count} of {name} taken; {100 * share:.2g} % of its area left out")
+        vertices, triangles = compact(vertices, triangles[parts == number - 1])
     if choice.cap is not None:
         vertices, triangles = capped(name, vertices, triangles, choice.cap, scale, note)
     if choice.union:

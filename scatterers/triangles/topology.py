@@ -169,7 +169,15 @@ def oriented(name: str, vertices: FloatArray, triangles: IntArray, note: Note) -
     _check_pieces(name, vertices, triangles, order, edges)
     agree = edges.forward[order[:, 0]] != edges.forward[order[:, 1]]
     if not agree.all():
-        turned = _turned(name, len(triangles), order // 3, agree)
+        # triangles to turn so that all agree with their neighbours
+        count = len(triangles)
+        left, right = (order // 3).T
+        starts = np.concatenate([left, left + count])
+        ends = np.concatenate([np.where(agree, right, right + count), np.where(agree, right + count, right)])
+        _, label = components(2 * count, starts, ends)
+        if np.any(label[:count] == label[count:]):
+            raise ValueError(f"{name} has one side only, like a Moebius strip or Klein bottle; give a body")
+        turned = np.asarray(label[:count] > label[count:])
         triangles = np.where(turned[:, None], triangles[:, ::-1], triangles)
         wrong = min(int(turned.sum()), len(triangles) - int(turned.sum()))
     a, b, c = np.moveaxis(vertices[triangles], 1, 0)
@@ -242,17 +250,6 @@ def umbrellas(edges: Edges, left: IntArray, right: IntArray) -> tuple[int, IntAr
 def next_corner(corner: IntArray) -> IntArray:
     """Corner (k,) of the flat triangles that follows in the same triangle."""
     return corner - corner % 3 + (corner + 1) % 3
-
-
-def _turned(name: str, count: int, pairs: IntArray, agree: BoolArray) -> BoolArray:
-    """Triangles to turn so that all agree with their neighbours."""
-    left, right = pairs.T
-    starts = np.concatenate([left, left + count])
-    ends = np.concatenate([np.where(agree, right, right + count), np.where(agree, right + count, right)])
-    _, label = components(2 * count, starts, ends)
-    if np.any(label[:count] == label[count:]):
-        raise ValueError(f"{name} has one side only, like a Moebius strip or Klein bottle; give a body")
-    return np.asarray(label[:count] > label[count:])
 
 
 def cut(vertices: FloatArray, triangles: IntArray, edge: IntArray, at: FloatArray) -> tuple[FloatArray, IntArray]:

@@ -35,7 +35,7 @@ def cut_of(found):
 def found_of(body, request=REQUEST):
     flow = cr.DirectFlow(body, rtol=1e-8)
     frame = preview_of(flow, request, step_of(body))
-    mesh = triangulate(body.level, body.gradient, body.bounds, cells=10)
+    mesh = triangulate(body, cells=10)
     return frame, mesh, refined_view(flow, frame, mesh.vertices)
 
 

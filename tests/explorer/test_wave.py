@@ -68,7 +68,7 @@ def test_colours_are_crests_and_troughs_of_the_range():
 
 def test_the_wave_on_the_body_is_that_of_the_series():
     body, request = sc.Sphere(), REQUEST.changed(theta=0.0, phi=0.0, length=6.0, rays=64)
-    mesh = triangulate(body.level, body.gradient, body.bounds, cells=10)
+    mesh = triangulate(body, cells=10)
     frame = frame_of(body, request)
     found = refined_view(frame.fan.flow, frame, mesh.vertices)
     exact = sphere.total_field(30.0, 1.0, mesh.vertices * (1 + 1e-12), np.array([0.0, 0.0, 1.0]), "hard")

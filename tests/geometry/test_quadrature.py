@@ -62,7 +62,7 @@ def test_slow_waves_take_few_nodes_and_fast_ones_no_more(make, monkeypatch):
 def test_coarse_meshes_that_do_not_close_are_passed_over(monkeypatch):
     """Of the peanut few points on large tiles miss the area by more than 1e-4; those that are taken do not."""
     body = bodies()["peanut"][0]
-    rough = quadrature._nodes(body, quadrilaterals(body.level, body.gradient, body.bounds, cells=6, fewest=6), 3)
+    rough = quadrature._nodes(body, quadrilaterals(body, cells=6, fewest=6), 3)
     sharp = body_nodes(body, 80.0).weights.sum()
     assert abs(rough.weights.sum() / sharp - 1) > 1e-4 and rough.error > tile_rules.CLOSED
     taken = body_nodes(body, 16.0)

@@ -18,11 +18,11 @@ def test_other_grids_are_tried_where_finer_ones_would_be_too_many(monkeypatch):
         return unclosed(tiles) if len(tried) == 3 else np.array([0])
 
     monkeypatch.setattr(triangulation, "_unclosed", second_of_others)
-    mesh = triangulate(ball.level, ball.gradient, ball.bounds, cells=40)
+    mesh = triangulate(ball, cells=40)
     assert mesh.euler_characteristic == 2 and tried[0] > tried[1] > tried[2]
     monkeypatch.setattr(triangulation, "_unclosed", lambda tiles: np.array([0, 7]))
     with pytest.raises(SurfaceError, match=r"grid points do not resolve the surface at 2 places, the first near \("):
-        triangulate(ball.level, ball.gradient, ball.bounds, cells=40)
+        triangulate(ball, cells=40)
 
 
 def test_places_where_a_surface_does_not_close_are_told():

@@ -65,7 +65,7 @@ def test_two_circles_seen_from_the_middle_of_a_torus():
 @pytest.mark.parametrize("name", BODIES)
 def test_curves_and_states_by_another_route(name, rng):
     body = BODIES[name]()
-    mesh = triangulate(body.level, body.gradient, body.bounds, cells=120)
+    mesh = triangulate(body, cells=120)
     share = np.linspace(1e-4, 1, 1500)[1:, None]
     for source in sources(body, 8, rng):
         line = cr.shadow_line(body, source=cr.PointSource(source), n_points=64)

@@ -408,7 +408,7 @@ def fold_error(
     >>> import scatterers as sc
     >>> from creeping.geometry.triangulation import triangulate
     >>> body, d = sc.Sphere(), np.array([[0.0, 0.0, 1.0]])
-    >>> mesh = triangulate(body.level, body.gradient, body.bounds)
+    >>> mesh = triangulate(body)
     >>> fold_error(body, mesh, d, -d, 30.0).tolist()                                 # a sphere has none
     [0.0]
     """
