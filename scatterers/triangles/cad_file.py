@@ -290,7 +290,7 @@ def _meshed(path: Path, points: int, sew: float | None, curved: int) -> dict[str
         try:
             done = subprocess.run(command, capture_output=True, timeout=TIMEOUT, check=False, text=True)
         except subprocess.TimeoutExpired:
-            raise ValueError(f"{path.name}: gmsh did not mesh it within {TIMEOUT} s; simplify the body") from None
+            raise ValueError(f"{path.name}: gmsh did not mesh it within {TIMEOUT} s; mend faces that cross themselves, or simplify it") from None
         if done.returncode or not out.exists():
             lines = [line for line in (done.stderr or "").splitlines() if line.strip()]
             if "libGL" in done.stderr or "cannot open shared object" in done.stderr:

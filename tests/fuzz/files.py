@@ -246,8 +246,11 @@ class CadFiles:
 
     def prepare(self, folder: Path) -> None:
         """Have gmsh write an ellipsoid."""
+        from scatterers.triangles import cad_file
         from tests.cad_files import write_ellipsoid
 
+        # gmsh tries for ever to mesh some patches that cross themselves: what ends it is the limit, here a short one
+        cad_file.TIMEOUT = 10
         write_ellipsoid(folder / "seed.step")
         self.seed = (folder / "seed.step").read_bytes()
 
