@@ -351,23 +351,20 @@ def cut_grid(
         fan = source if isinstance(source, RayFan) and method == "auto" else None
         return fan is None or affordable(fan, int(weight * _count(sides, spacing)), k)
 
-    a, b = (_steps(side, _spacing(sides, step, k, enough)) for side in sides)
+    # no further apart than the spacing, the middle among them
+    spacing = _spacing(sides, step, k, enough)
+    halves = np.maximum(1, np.ceil(0.5 * sides / spacing * (1 - 1e-9))).astype(int)
+    a, b = (0.5 * side * np.arange(-half, half + 1) / half for side, half in zip(sides, halves, strict=True))
     shape = len(b), len(a)
     whole = CutGrid(
         direction=direction, point=middle.copy(), axes=axes, across=a, up=b, outside=np.ones(shape, bool), wavenumber=k
     )
-    outside = _outside(body, whole.points.reshape(-1, 3)).reshape(shape)
+    x = whole.points.reshape(-1, 3)
+    # NaN of a level is deep inside
+    outside = (body.level(x) >= 0 if hasattr(body, "level") else ~inside(body, x)).reshape(shape)
     if not np.any(outside):
         raise InvalidInputError(f"all {outside.size} points are inside the body; give a larger extent")
     return replace(whole, outside=outside)
-
-
-def _outside(body: Surface, points: FloatArray) -> BoolArray:
-    """Whether points (n, 3), L, are outside a body, or on it (n,)."""
-    if hasattr(body, "level"):
-        # NaN of a level is deep inside
-        return np.asarray(body.level(points) >= 0)
-    return ~inside(body, points)
 
 
 def _checked(
@@ -409,12 +406,6 @@ def _sides(extent: ArrayLike | None, axes: FloatArray, box: FloatArray) -> Float
     if sides.shape != (2,) or not (np.all(np.isfinite(sides)) and np.all(sides > 0)):
         raise InvalidInputError(f"extent = {extent!r}: give a width and a height, positive and finite")
     return sides
-
-
-def _steps(side: float, spacing: float) -> FloatArray:
-    """Places along a side, no further apart than the spacing, the middle among them."""
-    half = max(1, int(np.ceil(0.5 * side / spacing * (1 - 1e-9))))
-    return np.asarray(0.5 * side * np.arange(-half, half + 1) / half)
 
 
 def _count(sides: FloatArray, spacing: float) -> float:

@@ -24,9 +24,7 @@ Sources: [LK59], [CK13]; Derivations, F10 to F17.
 # help() shows names of types instead of what they stand for
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -157,17 +155,16 @@ def far_in_parts(
             return piecewise_far_field(fan, r[some], k, boundary, order)
         return field_of(far_geometry(fan, r[some]), k, boundary, order)
 
-    far = FarField.joined([_kept(keep, f"rays-{some.start}", partial(some_of, some)) for some in parts])
+    def kept(some: slice) -> FarField:
+        if keep is not_kept:
+            return some_of(some)
+        return FarField.unpacked(keep(f"rays-{some.start}", lambda: some_of(some).packed()))
+
+    far = FarField.joined([kept(some) for some in parts])
     far = replace(far, validity=validity(fan, wavenumber=k), unit=unit_of(fan.body))
     auto = method == "auto" and order == 2 and len(r) > 0 and not piecewise
     level = measured_level(fan, k, boundary) if auto else None
     return level.applied(far) if level else far
-
-
-def _kept(keep: Keeping, name: str, make: Callable[[], FarField]) -> FarField:
-    if keep is not_kept:
-        return make()
-    return FarField.unpacked(keep(name, lambda: make().packed()))
 
 
 class Level(NamedTuple):

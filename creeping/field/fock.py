@@ -19,6 +19,7 @@ Also here: height gains: modes of a creeping wave, and their sum, at a height ab
 Sources: [F65], [P79], [PBM80], [KP74] for F_t; [F65], [AS64, sec. 10.4]; Derivations, F2 and F8.
 """
 
+from collections.abc import Sequence
 from functools import cache
 from math import factorial
 
@@ -67,38 +68,35 @@ def _path() -> tuple[ComplexArray, ...]:
         # numerator: v on the lower leg, w2/2i on the upper one
         upper, upper_slope, rise = scaled_v(t) if turn.imag < 0 else scaled_w2(t)
         lower, lower_slope, fall = scaled_w1(t)
-        legs.append((t, w * turn, lower, lower_slope, upper, upper_slope, fall, rise))
+        legs.append((t, w * turn, lower, lower_slope, fall, upper, upper_slope, rise))
     return tuple(np.concatenate(parts) for parts in zip(*legs, strict=True))
 
 
 def _by_path(which: str, xi: FloatArray, q: ComplexArray | None, power: int) -> ComplexArray:
     """p*, its derivative in q, or the surface function by both legs: xi (n,), q (n,) or None for soft."""
-    t, weight, lower, lower_slope, upper, upper_slope, fall, rise = _path()
+    t, weight, *both = _path()
     out = np.empty(len(xi), dtype=complex)
     # on the upper leg the path runs towards 0 in g and F; d/dq of V is -1/(..)², of W/2i it is 1/(..)² (Wronskians)
     turned = np.where(t.imag > 0, 1.0, -1.0)
     # blocks bound the memory of points x nodes
     for first in range(0, len(xi), 4096):
         part = slice(first, first + 4096)
-        below, above = (
-            (lower, upper) if q is None else (lower_slope - q[part, None] * lower, upper_slope - q[part, None] * upper)
-        )
-        phase = 1j * xi[part, None] * t
-        if which == "pekeris":
-            terms = above / below * np.exp(phase + fall - rise)
-        else:
-            terms = turned * _others(which, phase, lower, below, fall)
-        out[part] = terms @ (weight * t**power) / np.sqrt(np.pi)
+        terms = _integrand(which, 1j * xi[part, None] * t, q, part, both[:3], both[3:])
+        out[part] = (terms if which == "pekeris" else turned * terms) @ (weight * t**power) / np.sqrt(np.pi)
     return out
 
 
-def _others(
-    which: str, phase: ComplexArray, lower: ComplexArray, below: ComplexArray, fall: ComplexArray
+def _integrand(
+    which: str, phase: ComplexArray, q: ComplexArray | None, part: slice, lower: Sequence[Any], upper: Sequence[Any]
 ) -> ComplexArray:
-    """What the integrals of all but p* have at their nodes, with w1 = ``lower`` and w1' - q w1 = ``below`` scaled."""
+    """What the integrals have at their nodes, for a part of q, with scaled w1 below, and above v or w2/2i."""
+    below, above = (w[0] if q is None else w[1] - q[part, None] * w[0] for w in (lower, upper))
+    fall = lower[2]
+    if which == "pekeris":
+        return np.asarray(above / below * np.exp(phase + fall - upper[2]))
     if which == "slope":
         return np.asarray(1 / below**2 * np.exp(phase + 2 * fall))
-    return np.asarray(-(1 if which == "surface" else lower / below) / below * np.exp(phase + fall))
+    return np.asarray(-(1 if which == "surface" else lower[0] / below) / below * np.exp(phase + fall))
 
 
 def boundary_modes(q: ComplexArray | float | None, n: int = MODES) -> Modes:
@@ -223,14 +221,9 @@ def _by_descent(which: str, xi: FloatArray, q: ComplexArray | None, power: int) 
         # the integrand is a Gaussian of variance |ξ|/2, or 2|ξ|, times a slow factor
         step = (0.24 if on_surface else 0.12) * np.sqrt(-x)
         t = -(x**2) * (1.0 if on_surface else 0.25) + step * np.arange(-55, 56) * np.exp(0.75j * np.pi)
-        lower, lower_slope, fall = scaled_w1(t)
-        below = lower if q is None else lower_slope - q[part, None] * lower
-        if which == "pekeris":
-            upper, upper_slope, rise = scaled_w2(t)
-            above = upper if q is None else upper_slope - q[part, None] * upper
-            terms = above / below * np.exp(1j * x * t + fall - rise)
-        else:
-            terms = _others(which, 1j * x * t, lower, below, fall)
+        lower = scaled_w1(t)
+        # w2 is of p* alone
+        terms = _integrand(which, 1j * x * t, q, part, lower, scaled_w2(t) if which == "pekeris" else lower)
         out[part] = np.sum(terms * t**power, axis=1) * step[:, 0] * np.exp(0.75j * np.pi) / np.sqrt(np.pi)
     return out + pole(xi, power) if which == "pekeris" else out
 
@@ -290,18 +283,6 @@ def _tabulated(which: str, xi: FloatArray, q: complex | None, power: int) -> Com
     if np.any(deep):
         out[deep] = _by_series(which, xi[deep], None if q is None else np.full(int(deep.sum()), q), power)
     return out
-
-
-def transition(X: ArrayLike) -> ComplexArray:
-    """UTD transition function F_t(X) = -2i √X e^{-iX} ∫_√X^∞ e^{it²} dt, X >= 0; tends to 1: (...) -> (...).
-
-    Examples
-    --------
-    >>> complex(transition(1.0).round(6))
-    (0.809525-0.232199j)
-    """
-    root = np.sqrt(np.asarray(X, dtype=float))
-    return np.asarray(root * transition_rate(root))
 
 
 def transition_rate(root: ArrayLike) -> ComplexArray:

@@ -27,7 +27,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from creeping._typing import ArrayLike, ComplexArray, FloatArray, IntArray
+from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import Boundary
 from creeping.field.currents.whole_body import SurfaceCurrents, far_enough
 from creeping.field.on_body import OnBody, field_on_body
@@ -42,6 +42,8 @@ LOWEST = 0.27
 """Least height, in wavelengths, at which currents are asked, and that of further points above it."""
 FOOT = 1e-6
 """Distance, in body sizes, up to which a point is above its foot."""
+Tops = tuple[list[ComplexArray], list[FloatArray]]
+"""Fields at heights above the feet, and their errors."""
 
 
 def heights_of(problem: Problem) -> tuple[float, ...]:
@@ -73,15 +75,15 @@ def layer_fields(problem: Problem, currents: SurfaceCurrents, points: FloatArray
     above = [currents.total(top, occluded(body, top, d)) for top in tops]
     # waves behind the body run along it
     c, t = np.maximum(-nodes.normals @ d, 0.15), k * height
-    columns = []
+    weights, columns = _weights(c, t, heights), []
     for i, one in enumerate(surface.columns):
-        values, errors = ([columns_of(part)[i] for part in each] for each in zip(*above, strict=True))
+        each: Any = tuple([columns_of(part)[i] for part in parts] for parts in zip(*above, strict=True))
         with np.errstate(invalid="ignore", over="ignore"):
             # what is not OK may be infinite
             if problem.vector:
-                field, error = _vectors(nodes, surface, i, values, errors, c, t, k, heights)
+                field, error = _vectors(nodes, surface, i, each, weights, k, heights[0])
             else:
-                field, error = _scalars(nodes, one, values, errors, c, t, k, problem.kind.at(nodes.points))
+                field, error = _scalars(nodes, one, each, weights[0], k, problem.kind.at(nodes.points))
         found = measured_field(field, error, "layer", "extinction+expansion")
         status = np.where(one.status == FieldStatus.OK, found.status, one.status)
         columns.append(replace(found, status=status.astype(np.int64)))
@@ -90,14 +92,7 @@ def layer_fields(problem: Problem, currents: SurfaceCurrents, points: FloatArray
 
 
 def _scalars(
-    nodes: BodyNodes,
-    surface: PointValues,
-    tops: list[ComplexArray],
-    errors: list[FloatArray],
-    c: FloatArray,
-    t: FloatArray,
-    k: float,
-    kind: Boundary,
+    nodes: BodyNodes, surface: PointValues, tops: Tops, w: FloatArray, k: float, kind: Boundary
 ) -> tuple[ComplexArray, FloatArray]:
     """U and its error (n,) from that on the body and at two heights."""
     on, off, nothing = surface.values, surface.error, np.zeros_like(surface.values)
@@ -105,41 +100,38 @@ def _scalars(
         known, its = [nothing, on / k], [np.abs(nothing), off / k]
     else:
         known, its = [on, np.asarray(-1j * kind.admittance * on)], [off, np.abs(kind.admittance) * off]
-    w, _ = _weights(c, t, (LOWEST, 2 * LOWEST))
-    each = [w[:, i] * one for i, one in enumerate([*its, *errors])]
+    each = [w[:, i] * one for i, one in enumerate([*its, *tops[1]])]
     error = np.linalg.norm([*each, (0.03 if kind.kind == "impedance" else 0.1) * nodes.bending / k], axis=0)
-    return np.sum(w * np.stack([*known, *tops], axis=1), axis=1), error
+    return np.sum(w * np.stack([*known, *tops[0]], axis=1), axis=1), error
 
 
 def _vectors(
     nodes: BodyNodes,
     surface: OnBody,
     i: int,
-    tops: list[ComplexArray],
-    errors: list[FloatArray],
-    c: FloatArray,
-    t: FloatArray,
+    tops: Tops,
+    weights: tuple[FloatArray, FloatArray],
     k: float,
-    heights: tuple[float, ...],
+    least: float,
 ) -> tuple[ComplexArray, FloatArray]:
     """E and H (n, 6) of a polarisation, and the larger error of the two (n,), from fields at heights (n, 6)."""
+    (values, errors), (w, v) = tops, weights
     n, total = nodes.normals, nodes.total_curvature / k
     J, off = surface.columns[i].values, surface.columns[i].error
-    w, v = _weights(c, t, heights)
     charge, magnetic = surface.charge[:, i], np.cross(J, n)
-    normal_E, normal_H = (np.stack([np.sum(n * top[:, part], axis=1) for top in tops]) for part in (E, H))
+    normal_E, normal_H = (np.stack([np.sum(n * top[:, part], axis=1) for top in values]) for part in (E, H))
     E_n = (w[:, 0] - w[:, 1] * total) * charge + w[:, 2] * normal_E[0] + w[:, 3] * normal_E[1]
     H_n = w[:, 1] * surface.slope[:, i] + w[:, 2] * normal_H[0] + w[:, 3] * normal_H[1]
     bent = np.einsum("nij,nj->ni", nodes.hessians[:, SYMMETRIC], magnetic) / k
     bent = bent - np.sum(n * bent, axis=1, keepdims=True) * n
     H_t = w[:, :1] * magnetic - w[:, 1:2] * bent
     E_t = np.zeros_like(H_t)
-    for j, top in enumerate(tops):
+    for j, top in enumerate(values):
         E_t = E_t + v[:, j + 1, None] * (top[:, E] - normal_E[j][:, None] * n)
         if j < 2:
             H_t = H_t + w[:, j + 2, None] * (top[:, H] - normal_H[j][:, None] * n)
     field = np.concatenate([E_t + E_n[:, None] * n, H_t + H_n[:, None] * n], axis=1)
-    left_out = nodes.bending / k * (heights[0] / LOWEST) ** 3
+    left_out = nodes.bending / k * (least / LOWEST) ** 3
     shared = [w[:, 2] * errors[0], w[:, 3] * errors[1]]
     of_charge = (w[:, 0] - w[:, 1] * total) * surface.charge_error[:, i]
     across = [v[:, j + 1] * error for j, error in enumerate(errors)]

@@ -29,12 +29,12 @@ from creeping._typing import Any, ArrayLike, BoolArray, ComplexArray, FloatArray
 from creeping.errors import InvalidInputError, SurfaceError
 from creeping.field.arguments import METHODS, PLAIN, checked, checked_method, checked_plain
 from creeping.field.body_currents import CUT, cached_currents, has_expansions, solution_of_pieces
-from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, boundary_name, scalar_boundaries
+from creeping.field.boundary import Boundary, BoundaryLike, boundary_name, scalar_boundaries
 from creeping.field.currents.conductor import ConductorCurrents
 from creeping.field.currents.nodes import RAYS, STEPS
 from creeping.field.currents.radiation import grid_cells, may_self_reflect, transformed
 from creeping.field.currents.whole_body import POINTS, SurfaceCurrents
-from creeping.field.equation.effort import expected_seconds_of, plan_of, too_much
+from creeping.field.equation.effort import equation_boundary, expected_seconds_of, plan_of, too_much
 from creeping.field.equation.solving import is_rough
 from creeping.field.lit_ground import convex
 from creeping.field.marching.fan_waves import marchable
@@ -122,8 +122,7 @@ class Problem:
     @cached_property
     def kind(self) -> Boundary:
         """The boundary of its equation: of a conductor one."""
-        kinds = scalar_boundaries(self.boundary)
-        return CONDUCTOR if len(kinds) == 2 else kinds[0]
+        return equation_boundary(self.boundary)
 
     @property
     def vector(self) -> bool:

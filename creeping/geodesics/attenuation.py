@@ -33,6 +33,7 @@ from creeping.geodesics.equations import natural_horizon, vector_field
 from creeping.geodesics.integrator import trace_each, trace_states
 from creeping.geodesics.states import ATTENUATION, DETACHMENT, WHOLE
 from creeping.geometry.evaluators import evaluators, speed_of
+from creeping.geometry.patches import interpolation
 from creeping.geometry.surface import Surface
 from creeping.kernels.threads import BLOCK, in_slices, in_threads
 
@@ -56,25 +57,14 @@ def gauss_rule(count: int = 12) -> tuple[FloatArray, FloatArray]:
     return 0.5 * (points + 1), 0.5 * weights
 
 
-def lagrange(at: FloatArray, nodes: FloatArray | None = None) -> FloatArray:
-    """Values of the Lagrange polynomials of NODES points, of the Chebyshev points unless given: (m,) -> (m, NODES)."""
-    nodes = chebyshev_times() if nodes is None else nodes
-    basis = np.ones((len(at), NODES))
-    for j in range(NODES):
-        for k in range(NODES):
-            if j != k:
-                basis[:, j] *= (at - nodes[k]) / (nodes[j] - nodes[k])
-    return basis
-
-
 @cache
 def halves() -> FloatArray:
     """From values at the Chebyshev points of two halves to those of the whole: (NODES, 2 NODES)."""
     times = chebyshev_times()
     first = times < 0.5
     out = np.zeros((NODES, 2 * NODES))
-    out[first, :NODES] = lagrange(2 * times[first])
-    out[~first, NODES:] = lagrange(2 * times[~first] - 1)
+    out[first, :NODES] = interpolation(times, 2 * times[first])
+    out[~first, NODES:] = interpolation(times, 2 * times[~first] - 1)
     return out
 
 
@@ -85,8 +75,8 @@ def kernel_rules() -> tuple[FloatArray, ...]:
     Matrices from values at the Chebyshev points to those at the Gauss points and both ends, (14, NODES), and to equally
     spaced ones, between which the first zero is looked for, (33, NODES); Gauss points and weights; Chebyshev points.
     """
-    sampling = lagrange(np.concatenate([gauss_rule()[0], [0.0, 1.0]]))
-    return sampling, lagrange(np.linspace(0, 1, 33)), *gauss_rule(), chebyshev_times()
+    places = np.concatenate([gauss_rule()[0], [0.0, 1.0]]), np.linspace(0, 1, 33)
+    return *(interpolation(chebyshev_times(), at) for at in places), *gauss_rule(), chebyshev_times()
 
 
 @cache
@@ -106,8 +96,8 @@ def fine_rules() -> tuple[FloatArray, ...]:
     points, weights = gauss_rule(NODES - 2)
     nodes = np.concatenate([[0.0], points, [1.0]])
     inside, part_weights = gauss_rule(3)
-    refined = lagrange(((np.arange(16)[:, None] + inside) / 16).ravel(), nodes)
-    return points, weights, nodes, lagrange(np.linspace(0, 1, 17), nodes), refined, np.tile(part_weights / 16, 16)
+    refined = interpolation(nodes, ((np.arange(16)[:, None] + inside) / 16).ravel())
+    return points, weights, nodes, interpolation(nodes, np.linspace(0, 1, 17)), refined, np.tile(part_weights / 16, 16)
 
 
 class Sliding(NamedTuple):

@@ -214,15 +214,9 @@ def _newton(
             break
         gram = np.einsum("nij,nik->njk", columns, columns)
         right = np.einsum("nij,ni->nj", columns, gap)
-        determinant = gram[:, 0, 0] * gram[:, 1, 1] - gram[:, 0, 1] ** 2
-        with np.errstate(divide="ignore", invalid="ignore"):
-            move = np.stack(
-                [
-                    (gram[:, 1, 1] * right[:, 0] - gram[:, 0, 1] * right[:, 1]) / determinant,
-                    (gram[:, 0, 0] * right[:, 1] - gram[:, 0, 1] * right[:, 0]) / determinant,
-                ],
-                axis=-1,
-            )
+        # where both columns are one there is no solution
+        gram[:, [0, 1], [0, 1]] += 1e-14 * np.trace(gram, axis1=1, axis2=2)[:, None] + 1e-300
+        move = np.linalg.solve(gram, right[..., None])[..., 0]
         move = np.clip(np.nan_to_num(move), -np.array(widths), np.array(widths))
         sigma = sigma + move[:, 0]
         s = np.clip(s + move[:, 1], 0.0, strip.times[-1])

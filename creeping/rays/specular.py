@@ -243,7 +243,9 @@ def specular_on_pieces(
     pieces, tiles, found = pieces_of(body), tiles_of(body, 0.05), []
     for number in numbers:
         corners = tiles.corners[tiles.pieces == number]
-        if not len(corners) or _is_flat(pieces[number], corners.mean(axis=1), size(body)):
+        bent = bending(pieces[number], corners.mean(axis=1))[1] if len(corners) else np.zeros((1, 3, 3))
+        # none is on a flat piece
+        if np.max(np.linalg.norm(bent, axis=(1, 2))) * size(body) < FLAT:
             continue
         # drawn to their middles: at a tip there is no normal
         corners = corners + 1e-6 * (corners.mean(axis=1, keepdims=True) - corners)
@@ -269,7 +271,3 @@ def stand_clear(body: Any, points: SpecularPoints, wavenumber: float) -> BoolArr
     zone = np.sqrt(np.pi / (wavenumber * bent))
     sharp = nearest_crease(body, points.points, kinds=("edge", "tip"))[1]
     return np.asarray((sharp > zone) & (nearest_crease(body, points.points, kinds=("joint",))[1] > 0.5 * zone))
-
-
-def _is_flat(piece: Any, x: FloatArray, scale: float) -> bool:
-    return bool(np.max(np.linalg.norm(bending(piece, x)[1], axis=(1, 2))) * scale < FLAT)

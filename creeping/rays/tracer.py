@@ -120,7 +120,6 @@ class RayTracer:
         starts: FloatArray,
         openings: FloatArray,
         latest: float,
-        step: float,
         before: bool,
     ) -> tuple[FloatArray, FloatArray]:
         """x, p, J, J' at equal steps, GUARD of them before the launch point and beyond a time: (n, K, 8).
@@ -128,15 +127,15 @@ class RayTracer:
         Those ``before`` are copies of the launch point unless they are wanted. And the times (n,) at which rays end at
         creases.
         """
-        last = int(np.ceil(latest / step)) + GUARD + 1
-        forward: FloatArray = step * np.arange(last + 1, dtype=np.float64)
-        ahead, end = self._traced(pack(starts, directions, jacobi=True), forward, step)
+        last = int(np.ceil(latest / self.step)) + GUARD + 1
+        forward: FloatArray = self.step * np.arange(last + 1, dtype=np.float64)
+        ahead, end = self._traced(pack(starts, directions, jacobi=True), forward)
         _open(ahead, openings)
         if not before:
             # never read, but polynomials of the first steps pass there
             return np.concatenate([np.repeat(ahead[:, :1, :8], GUARD, axis=1), ahead[..., :8]], axis=1), end
         some = forward[: GUARD + 1]
-        back, _ = self._traced(pack(starts, -directions, jacobi=True), some, step)
+        back, _ = self._traced(pack(starts, -directions, jacobi=True), some)
         _open(back, -openings)
         states = np.empty((len(starts), last + 1 + GUARD, 8))
         states[:, GUARD:] = ahead[..., :8]
@@ -211,7 +210,7 @@ class RayTracer:
                 now, which = times[rows], rank[owner[rows]] - k
                 before = whole or float(np.min(now)) < GUARD * step
                 states, ends_of[mine] = self._states(
-                    directions[mine], starts[mine], opened[mine], float(np.max(latest[mine])) + 2 * step, step, before
+                    directions[mine], starts[mine], opened[mine], float(np.max(latest[mine])) + 2 * step, before
                 )
                 if whole and hasattr(self.body, "non_smooth"):
                     ahead = states[:, GUARD:, X]
@@ -239,12 +238,12 @@ class RayTracer:
         found, _ = trace_to(self.body, pack(starts, directions, jacobi=True), times, rtol=RTOL)
         return found[:, :8]
 
-    def _traced(self, states: FloatArray, times: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
+    def _traced(self, states: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Rays at equal steps, beyond an edge or tip as if their piece went on, for the polynomials' sake; and ends."""
         if is_piecewise(self.body):
-            found = trace_pieces(self.body, states, times, rtol=RTOL, beyond=(GUARD + 2) * step)
+            found = trace_pieces(self.body, states, times, rtol=RTOL, beyond=(GUARD + 2) * self.step)
             return found.states, found.end
-        return trace_states(self.body, states, times, rtol=0.0, step=step), np.full(len(states), np.inf)
+        return trace_states(self.body, states, times, rtol=0.0, step=self.step), np.full(len(states), np.inf)
 
     def crossing(
         self,

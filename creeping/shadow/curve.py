@@ -52,10 +52,6 @@ class ShadowCurve(DrawnOnBody):
     closed : bool
     piece : int
         Number of the piece on which the curve lies; -1 on a smooth body.
-    creases : tuple of int
-        For an open curve, numbers of the creases at its start and end.
-    goes_on : tuple of int
-        For an open curve, numbers of the curves that continue it across a joint at its start and end; -1 for none.
     panels : PanelCurve or None
         The curve exact to rounding: on a piece, and where it turns so fast that its nodes are too far apart.
     """
@@ -74,8 +70,6 @@ class ShadowCurve(DrawnOnBody):
     nodes: FloatArray
     closed: bool = True
     piece: int = -1
-    creases: tuple[int, int] = (-1, -1)
-    goes_on: tuple[int, int] = (-1, -1)
     panels: PanelCurve | None = None
 
     @property

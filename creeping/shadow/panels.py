@@ -61,12 +61,6 @@ def _crossed(a: FloatArray, b: FloatArray) -> FloatArray:
     return out
 
 
-def _limited(step: FloatArray, reach: FloatArray | float) -> FloatArray:
-    norm = np.linalg.norm(step, axis=-1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(step * np.minimum(1.0, reach / norm)[..., None]) if np.any(norm > reach) else step
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class PanelCurve:
     """Curve in panels.
@@ -175,7 +169,9 @@ def fit_panels(
         halves = []
         for i in bad:
             low, high = todo[i]
-            middle = _between(low, high)
+            # a whole number strictly between them, or their mean if there is none
+            first, after = np.floor(low) + 1, np.ceil(high) - 1
+            middle = float((first + after) // 2) if first <= after else (low + high) / 2
             if middle not in known:
                 with np.errstate(divide="ignore", invalid="ignore"):
                     guess = _hermite([of[i : i + 1] for of in ends], np.zeros(1))[0]
@@ -196,12 +192,6 @@ def fit_panels(
     done.sort(key=lambda panel: panel[0])
     first, shape, speed = (np.array([panel[k] for panel in done]) for k in (1, 2, 3))
     return PanelCurve(body, wave, first, shape, speed, closed)
-
-
-def _between(low: float, high: float) -> float:
-    """Middle whole number strictly between two keys, or their mean if there is none."""
-    first, last = np.floor(low) + 1, np.ceil(high) - 1
-    return float((first + last) // 2) if first <= last else (low + high) / 2
 
 
 def _forward_nodes(body: Surface, wave: FloatArray, nodes: FloatArray, spacing: FloatArray) -> FloatArray:
@@ -242,7 +232,8 @@ def _fit(
     step = np.zeros_like(points)
     for _ in range(7):
         step, _ = newton_step(body, wave, points, axis)
-        points = points + _limited(step, reach)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            points = points + step * np.minimum(1.0, reach / np.linalg.norm(step, axis=1))[:, None]
     _, tangent = newton_step(body, wave, points, axis)
     aligned = np.sum(tangent * axis, axis=1).reshape(-1, ORDER)
     moved = np.linalg.norm(step, axis=1).reshape(-1, ORDER)

@@ -16,7 +16,7 @@ import numpy as np
 
 from creeping._typing import Any, BoolArray, FloatArray
 from creeping.geodesics.pieces import REACH, to_tips
-from creeping.geometry.piecewise import Tiles, nearest_crease, piece_ahead, tips_of
+from creeping.geometry.piecewise import Tiles, piece_ahead, tips_of
 from creeping.geometry.surface import size
 from creeping.shadow.curves import Moved, moved_onto_lines, tangents_at
 
@@ -36,15 +36,12 @@ class PieceCurve(NamedTuple):
     nodes : (k, 3), L
         Along T; of an open curve the ends are among them.
     closed : bool
-    creases : tuple of int
-        At which the curve starts and ends; -1 for both of a closed one.
     gaps : tuple of float, L
         From either end to its tip, 0 at other creases.
     """
 
     nodes: FloatArray
     closed: bool
-    creases: tuple[int, int]
     gaps: tuple[float, float]
 
 
@@ -111,7 +108,7 @@ class _Walk:
 
         self.body, self.piece, self.number, self.direction = body, piece, number, direction
         self.size = size(body)
-        self.tip_numbers, self.tips = tips_of(body)
+        self.tips = tips_of(body)[1]
         self.broken = False
         corners = tiles.corners[tiles.pieces == number]
         sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=-1)
@@ -143,10 +140,10 @@ class _Walk:
         T = tangents_at(self.piece, self.direction, seed[None])[0]
         if not np.all(np.isfinite(T)):
             return None
-        ahead, closed, last, far = self._followed(seed, T, 1.0)
+        ahead, closed, far = self._followed(seed, T, 1.0)
         if closed:
-            return PieceCurve(ahead, True, (-1, -1), (0.0, 0.0))
-        back, _, first, near = self._followed(seed, T, -1.0)
+            return PieceCurve(ahead, True, (0.0, 0.0))
+        back, _, near = self._followed(seed, T, -1.0)
         nodes = np.concatenate([back[:0:-1], ahead])
         nodes = nodes[np.concatenate([[True], np.linalg.norm(np.diff(nodes, axis=0), axis=1) > 1e-13 * self.size])]
         if len(nodes) < 2:
@@ -157,13 +154,13 @@ class _Walk:
                 end = np.linalg.norm(nodes[inner] - nodes[inner - step])
                 if end < 0.05 * np.linalg.norm(nodes[inner + step] - nodes[inner]):
                     nodes = np.delete(nodes, inner, axis=0)
-        return PieceCurve(nodes, False, (first, last), (near, far))
+        return PieceCurve(nodes, False, (near, far))
 
     def _corrected(self, guess: FloatArray, reach: float, steps: int = 6) -> Moved:
         return moved_onto_lines(self.piece, self.direction, guess, reach=reach, steps=steps)
 
-    def _followed(self, start: FloatArray, T0: FloatArray, sign: float) -> tuple[FloatArray, bool, int, float]:
-        """Nodes from the start along sign T, whether they come round, the crease they end at, and the gap to it."""
+    def _followed(self, start: FloatArray, T0: FloatArray, sign: float) -> tuple[FloatArray, bool, float]:
+        """Nodes from the start along sign T, whether they come round, and the gap to the tip they end at."""
         # step in body sizes, and nodes
         longest, most = 0.04, 20_000
         nodes, T, h = [start], T0, longest * self.size
@@ -171,7 +168,7 @@ class _Walk:
             x = nodes[-1]
             tip = float(to_tips(self.tips, x[None])[0])
             if tip <= REACH * self.size:
-                return np.array(nodes), False, *self._end(x, tip)
+                return np.array(nodes), False, tip
             h = min(h, longest * self.size, max(0.5 * tip, 0.5 * REACH * self.size))
             found = self._corrected((x + sign * h * T)[None], 0.3 * h)
             y, V = found.points[0], found.tangents[0]
@@ -181,23 +178,23 @@ class _Walk:
                 h *= 0.5
                 if h < 1e-6 * self.size:
                     self.broken = True
-                    return np.array(nodes), False, -1, 0.0
+                    return np.array(nodes), False, 0.0
                 continue
             chord = y - x
             home = float((start - x) @ chord) / float(chord @ chord)
             miss = np.linalg.norm(start - x - home * chord)
             if len(nodes) > 2 and 0 < home <= 1 and miss < ALIKE * h and T0 @ V > 0.8:
-                return np.array(nodes), True, -1, 0.0
+                return np.array(nodes), True, 0.0
             shares = np.array([0.25, 0.5, 0.75, 1.0])
             out = ~self.inside(self._corrected(x + shares[:, None] * chord, 0.3 * h).points)
             if out.any():
                 k = int(np.argmax(out))
                 end = self._bisected(x, chord, shares[k - 1] if k else 0.0, shares[k])
-                return np.array([*nodes, end]), False, *self._end(end, 0.0)
+                return np.array([*nodes, end]), False, 0.0
             nodes.append(y)
             T, h = V, 1.5 * h
         self.broken = True
-        return np.array(nodes), False, -1, 0.0
+        return np.array(nodes), False, 0.0
 
     def _bisected(self, x: FloatArray, chord: FloatArray, low: float, high: float) -> FloatArray:
         """Last point of the piece between shares of a chord of the curve."""
@@ -214,15 +211,3 @@ class _Walk:
             else:
                 other = y[0]
         return np.asarray(best)
-
-    def _end(self, x: FloatArray, gap: float) -> tuple[int, float]:
-        """The crease at which a curve ends, and what is left to it if that is a tip."""
-        if gap > 0:
-            return int(self.tip_numbers[np.argmin(np.linalg.norm(self.tips - x, axis=1))]), gap
-        beyond = x + 1e-7 * self.size * np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
-        others = np.unique(np.asarray(self.body.piece(beyond)))
-        pairs = np.array([[self.number, other] for other in others if other != self.number])
-        if not len(pairs):
-            return int(nearest_crease(self.body, x[None])[0][0]), 0.0
-        found, distance = nearest_crease(self.body, np.repeat(x[None], len(pairs), axis=0), pairs)
-        return int(found[np.argmin(distance)]), 0.0

@@ -1,8 +1,7 @@
-"""Shadow lines of bodies with creases: the curves of each piece, where they go on beyond their ends, and edges.
+"""Shadow lines of bodies with creases: the curves of each piece, and edges.
 
 Each curve is that of a smooth F_i (`creeping.shadow.piece_curves`), in panels exact to rounding. Whether the wave comes
-to a point is asked of the whole body, at points of the curve and, by bisection, where two neighbours differ. At joints
-the curves of two pieces meet: there one goes on as the other.
+to a point is asked of the whole body, at points of the curve and, by bisection, where two neighbours differ.
 
 Parts of a body's creases belong to the line, too, but launch no creeping ray. Seen along d, the outline runs along a
 convex edge where it is lit on one side only,
@@ -15,7 +14,6 @@ tangents e = n_i x n_j/|.|.
 Sources: Derivations, R6 and R10.
 """
 
-from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -26,7 +24,7 @@ from scipy.optimize import brentq
 from creeping._typing import Any, BoolArray, FloatArray, IntArray
 from creeping.errors import SingularIncidenceError
 from creeping.geodesics.attenuation import gauss_rule
-from creeping.geometry.piecewise import SMOOTH, pieces_of, tiles_of
+from creeping.geometry.piecewise import pieces_of, tiles_of, tips_of
 from creeping.geometry.surface import size
 from creeping.shadow.arcs import shared_out
 from creeping.shadow.attachment import Arc, LaunchPoints, occluded
@@ -37,7 +35,7 @@ from creeping.shadow.piece_curves import EDGE_ON, PieceCurve, curves_on, edge_on
 from creeping.shadow.status import STATUSES, PointState
 
 MEET = 1e-7
-"""Distance of the ends of two curves, in body sizes, up to which they meet, and least length of a curve."""
+"""Least length of a curve, in body sizes."""
 
 
 def piecewise_curves(
@@ -79,7 +77,7 @@ def piecewise_curves(
                 curves.append(curve)
                 gaps += sum(found.gaps)
     curves.sort(key=lambda curve: -curve.length)
-    return _joined(body, curves), parts_on_edges(body, pieces, direction), gaps, level
+    return tuple(curves), parts_on_edges(body, pieces, direction), gaps, level
 
 
 def _as_far_as_known(
@@ -102,7 +100,9 @@ def _ended_earlier(body: Any, found: PieceCurve) -> PieceCurve | None:
     nodes, gaps = found.nodes, list(found.gaps)
     for side, way in ((0, 1), (1, -1)):
         if gaps[side] > 0:
-            away = np.linalg.norm(nodes[::way] - body.creases[found.creases[side]].points[0], axis=1)
+            tips = tips_of(body)[1]
+            tip = tips[np.argmin(np.linalg.norm(tips - nodes[-side], axis=1))]
+            away = np.linalg.norm(nodes[::way] - tip, axis=1)
             first = int(np.argmax(away > 2 * gaps[side]))
             nodes, gaps[side] = nodes[::way][first:][::way], float(away[first])
     if gaps == list(found.gaps) or len(nodes) < 3:
@@ -134,7 +134,6 @@ def _finished(
         nodes=points,
         closed=found.closed,
         piece=number,
-        creases=found.creases,
         panels=panels,
     )
     curve.status[:] = np.array(STATUSES)[curve.state_at(arclength)]
@@ -178,26 +177,6 @@ def _arcs(body: Any, piece: Any, direction: FloatArray, panels: PanelCurve) -> t
     starts, stops = starts - length * (starts >= length), stops - length * (starts >= length)
     order = np.argsort(starts)
     return tuple((float(starts[k]), float(stops[k]), STATUSES[after[k]]) for k in order)
-
-
-def _joined(body: Any, curves: list[ShadowCurve]) -> tuple[ShadowCurve, ...]:
-    """The curves with those that go on from their ends at joints."""
-    ends = [(number, side) for number, curve in enumerate(curves) if not curve.closed for side in (0, 1)]
-    goes_on = {end: -1 for end in ends}
-    for number, side in ends:
-        curve = curves[number]
-        crease = curve.creases[side]
-        if crease < 0 or body.creases[crease].kind not in SMOOTH:
-            continue
-        x = curve.points[-side]
-        others = [other for other in ends if other[0] != number and other[1] != side]
-        gaps = [float(np.linalg.norm(curves[k].points[-side_] - x)) for k, side_ in others]
-        if gaps and min(gaps) < MEET * size(body):
-            goes_on[number, side] = others[int(np.argmin(gaps))][0]
-    return tuple(
-        curve if curve.closed else replace(curve, goes_on=(goes_on[number, 0], goes_on[number, 1]))
-        for number, curve in enumerate(curves)
-    )
 
 
 def launched_from(curves: tuple[ShadowCurve, ...], arcs: list[Arc], direction: FloatArray, n_rays: int) -> LaunchPoints:

@@ -13,12 +13,12 @@ from creeping.geodesics.attenuation import (
     chebyshev_times,
     gauss_rule,
     halves,
-    lagrange,
 )
 from creeping.geodesics.integrator import trace_states
 from creeping.geodesics.states import pack, random_bundle_points
 from creeping.geometry.curvature import normal_curvature
 from creeping.geometry.evaluators import speed_values
+from creeping.geometry.patches import interpolation
 
 # unequal, repeated, with 0, and two that differ by rounding
 AWKWARD = np.array([0.0, 0.0, 0.3, 0.3, np.nextafter(0.3, 1), 0.31, 0.9, 0.9 + 1e-9, 2.0])
@@ -76,7 +76,7 @@ def test_rules():
     coefficients = np.arange(1.0, NODES + 1)
     polynomial = np.polynomial.Polynomial(coefficients)
     at = np.linspace(0, 1, 7)
-    np.testing.assert_allclose(lagrange(at) @ polynomial(times), polynomial(at), rtol=1e-12)
+    np.testing.assert_allclose(interpolation(times, at) @ polynomial(times), polynomial(at), rtol=1e-12)
     both = np.concatenate([polynomial(times / 2), polynomial(0.5 + times / 2)])
     np.testing.assert_allclose(halves() @ both, polynomial(times), rtol=1e-12)
     assert np.sum(gauss_rule()[1]) == pytest.approx(1)

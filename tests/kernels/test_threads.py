@@ -80,7 +80,7 @@ def test_no_bit_of_radiation_depends_on_the_slices(rng, monkeypatch):
     def sums():
         return (
             radiation.phase_sums(points, weights[None], unit, 9.0),
-            radiation.field_of_scalar(points, points, weights, weights, at, 9.0),
+            radiation.field_of_scalar((points, points), weights, weights, at, 9.0),
             radiation.field_of_vector(points, J, at, 9.0, electric=False),
         )
 

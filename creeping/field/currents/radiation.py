@@ -40,6 +40,8 @@ LOW = 0.3
 """T up to which W rises."""
 BLOCK = 16
 """Nodes that are looked at together, neighbours in space."""
+Nodes = tuple[FloatArray, FloatArray]
+"""Places (n, 3), L, and normals there."""
 
 
 def phase_sums(points: FloatArray, weights: ComplexArray, directions: FloatArray, wavenumber: float) -> ComplexArray:
@@ -90,29 +92,19 @@ def _by_transform(points: FloatArray, weights: ComplexArray, directions: FloatAr
 
 
 def far_of_scalar(
-    points: FloatArray,
-    normals: FloatArray,
-    u: ComplexArray | None,
-    slope: ComplexArray | None,
-    directions: FloatArray,
-    wavenumber: float,
+    nodes: Nodes, u: ComplexArray | None, slope: ComplexArray | None, directions: FloatArray, wavenumber: float
 ) -> ComplexArray:
     """f (m,), L, of u dS and du/dn dS at nodes (n,); None stands for nothing."""
-    columns = [] if u is None else list(-1j * wavenumber * u * normals.T)
+    columns = [] if u is None else list(-1j * wavenumber * u * nodes[1].T)
     if slope is not None:
         columns.append(-slope)
-    sums = phase_sums(points, np.array(columns), directions, wavenumber) / (4 * np.pi)
+    sums = phase_sums(nodes[0], np.array(columns), directions, wavenumber) / (4 * np.pi)
     f = np.zeros(len(directions), dtype=complex) if slope is None else sums[:, -1]
     return np.asarray(f if u is None else f + np.sum(sums[:, :3] * directions, axis=1))
 
 
 def field_of_scalar(
-    points: FloatArray,
-    normals: FloatArray,
-    u: ComplexArray | None,
-    slope: ComplexArray | None,
-    at: FloatArray,
-    wavenumber: float,
+    nodes: Nodes, u: ComplexArray | None, slope: ComplexArray | None, at: FloatArray, wavenumber: float
 ) -> ComplexArray:
     """Scattered field at points (m, 3), L, off the body, of u dS and du/dn dS at nodes (n,): (m,).
 
@@ -121,11 +113,11 @@ def field_of_scalar(
     from creeping.field.kernels.near_pairs import near
 
     given = slope if u is None else u
-    nothing = np.zeros((1, len(points)) if given is None else np.atleast_2d(given).shape, dtype=complex)
+    nothing = np.zeros((1, len(nodes[0])) if given is None else np.atleast_2d(given).shape, dtype=complex)
     single = -(nothing if slope is None else np.atleast_2d(slope)) / (4 * np.pi)
     double = (nothing if u is None else np.atleast_2d(u)) / (4 * np.pi)
     out = np.empty((len(at), 2 * len(nothing)))
-    columns = np.ascontiguousarray(points.T), np.ascontiguousarray(normals.T)
+    columns = [np.ascontiguousarray(part.T) for part in nodes]
     pairs = [np.ascontiguousarray(np.stack([w.real, w.imag])) for w in (single, double)]
     at = np.ascontiguousarray(at)
     in_threads(lambda part: near(*columns, *pairs, wavenumber, at[part], out[part]), len(at), least=32, multiple=8)
@@ -187,13 +179,7 @@ def may_self_reflect(body: Surface) -> bool:
 
 
 def received(
-    at: tuple[FloatArray, FloatArray],
-    nodes: tuple[FloatArray, FloatArray],
-    single: ComplexArray,
-    double: ComplexArray,
-    k: float,
-    *,
-    soft: bool,
+    at: Nodes, nodes: Nodes, single: ComplexArray, double: ComplexArray, k: float, *, soft: bool
 ) -> ComplexArray:
     """What points of the body receive, u or du/dn if soft (m,); points and their normals (m, 3), those of nodes (n, 3).
 
@@ -218,9 +204,7 @@ def received(
     return found
 
 
-def received_vectors(
-    at: tuple[FloatArray, FloatArray], nodes: tuple[FloatArray, FloatArray], strength: ComplexArray, k: float
-) -> ComplexArray:
+def received_vectors(at: Nodes, nodes: Nodes, strength: ComplexArray, k: float) -> ComplexArray:
     """J that points of a conductor receive (m, 3, p) from J dS/4 pi (n, 3, p) at nodes; the others as of `received`."""
     from creeping.field.kernels.bounce import vectors_from_above
 
@@ -243,14 +227,12 @@ def received_vectors(
     return found
 
 
-def _affordable(at: tuple[FloatArray, FloatArray], nodes: tuple[FloatArray, FloatArray], each: float = 1.0) -> bool:
+def _affordable(at: Nodes, nodes: Nodes, each: float = 1.0) -> bool:
     """Whether pairs take no more than eight seconds, if all stand above each other's horizon."""
     return 0 < each * len(at[0]) * len(nodes[0]) < 4e9
 
 
-def _blocks(
-    pair: tuple[FloatArray, FloatArray],
-) -> tuple[IntArray, tuple[FloatArray, FloatArray], tuple[FloatArray, ...]]:
+def _blocks(pair: Nodes) -> tuple[IntArray, Nodes, tuple[FloatArray, ...]]:
     """An order in which neighbours follow each other; in it points and normals (3, m), and the balls of blocks."""
     from creeping.field.kernels.bounce import balls
 

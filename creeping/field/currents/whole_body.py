@@ -38,7 +38,7 @@ were set on four bodies (`studies.accuracy.point_coverage`).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar
 
@@ -54,7 +54,7 @@ from creeping.field.results.far_result import FarField
 from creeping.geodesics.states import as_points
 from creeping.geometry.checks import unit_of
 from creeping.geometry.quadrature import body_nodes, inner_points
-from creeping.geometry.surface import Surface, inside
+from creeping.geometry.surface import Surface
 from creeping.storage.parts import Keeping, not_kept
 
 DEPTH = 0.25
@@ -90,14 +90,14 @@ class SurfaceCurrents:
     lit : (n,) of bool
         Whether the lit side's expansion gave the value, rather than creeping rays. For solved currents: whether the
         node is lit.
+    wavenumber : float, 1/L
+    boundary : Boundary
     rim : (l, 3), L
-        Equally spaced points of the shadow line.
+        Equally spaced points of the shadow line; none of solved currents.
     rim_length : float, L
         Length of the shadow line.
     unserved : float
         Share of the shadow line that launches no creeping ray; the currents behind that part are missing.
-    wavenumber : float, 1/L
-    boundary : Boundary
     solved : bool
         Whether the values solve the integral equation on the whole body (`creeping.field.equation`).
 
@@ -122,11 +122,11 @@ class SurfaceCurrents:
     values: ComplexArray
     change: ComplexArray
     lit: BoolArray
-    rim: FloatArray
-    rim_length: float
-    unserved: float
     wavenumber: float
     boundary: Boundary
+    rim: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    rim_length: float = 0.0
+    unserved: float = 0.0
     solved: bool = False
     _factors: ClassVar[tuple[float, float]] = (2.5, 2.0)
     """Factors of the error: of what all directions share, and of what the second order says of each."""
@@ -192,22 +192,6 @@ class SurfaceCurrents:
         single, double = (nothing if one is None else one / (4 * np.pi) for one in (slope, u))
         nodes = self.points, self.normals
         return received((points, normals), nodes, -single, double, self.wavenumber, soft=self.boundary.kind == "soft")
-
-    def left_inside(self, points: ArrayLike) -> ComplexArray:
-        """Residual field at points (m, 3), L, inside the body, relative to the incident wave: (m,).
-
-        Exact currents would leave 0.
-
-        Raises
-        ------
-        InvalidInputError
-            If a point is outside the body, or too close to its surface (see `scattered`).
-        """
-        x = as_points(points).reshape(-1, 3)
-        out = np.flatnonzero(~inside(self.body, x))
-        if len(out):
-            raise InvalidInputError(f"{len(out)} of {len(x)} points are outside the body (first: row {out[0]})")
-        return self._remainder(x, self.scattered(x))
 
     @cached_property
     def inner_points(self) -> FloatArray:
@@ -285,9 +269,8 @@ class SurfaceCurrents:
     @cached_property
     def _left(self) -> FloatArray:
         """What is left inside of each incident wave, rms, as a share of it: () or (2,)."""
-        return self._at_least(
-            self._rms(self._remainder(self.inner_points, self._field(self.values, self.inner_points)))
-        )
+        x = self.inner_points
+        return self._at_least(self._rms(self._remainder(x, self._field(self.values, x))))
 
     def _at_least(self, left: FloatArray) -> FloatArray:
         """What is left inside, no less than is known.
@@ -332,17 +315,17 @@ class SurfaceCurrents:
     def _radiated(self, values: ComplexArray, part: BoolArray, directions: FloatArray) -> ComplexArray:
         """f (m, ...) of values (n, ...) on some of the nodes."""
         u, slope = (None if one is None else one[part] for one in self._scalar(values))
-        return far_of_scalar(self.points[part], self.normals[part], u, slope, directions, self.wavenumber)
+        return far_of_scalar((self.points[part], self.normals[part]), u, slope, directions, self.wavenumber)
 
     def _field(self, values: ComplexArray, points: FloatArray) -> ComplexArray:
         """Field (m, ...) of values (n, ...) at points."""
-        return field_of_scalar(self.points, self.normals, *self._scalar(values), points, self.wavenumber)
+        return field_of_scalar((self.points, self.normals), *self._scalar(values), points, self.wavenumber)
 
     def _parts_of_field(self, part: BoolArray, points: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Fields (m, ...) of the values and of their second order on some of the nodes."""
         columns = self._scalar(np.stack([self.values, self.change]))
         u, slope = (None if one is None else one[:, part] for one in columns)
-        field = field_of_scalar(self.points[part], self.normals[part], u, slope, points, self.wavenumber)
+        field = field_of_scalar((self.points[part], self.normals[part]), u, slope, points, self.wavenumber)
         return field[:, 0], field[:, 1]
 
     @property

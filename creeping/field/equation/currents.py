@@ -350,7 +350,7 @@ class _OnTiles(SurfaceCurrents):
         """No currents, at the finer nodes."""
         x, normals, weights = self.matrix.tiles.fine
         nothing = np.zeros((len(x), *self.values.shape[1:]), dtype=complex)
-        same = {name: getattr(self, name) for name in ("body", "direction", "rim", "wavenumber", "boundary")}
+        same = {name: getattr(self, name) for name in ("body", "direction", "wavenumber", "boundary")}
         make = ConductorCurrents if nothing.ndim > 1 else SurfaceCurrents
         return make(
             **same,
@@ -361,8 +361,6 @@ class _OnTiles(SurfaceCurrents):
             values=nothing,
             change=nothing,
             lit=np.ones(len(x), dtype=bool),
-            rim_length=0.0,
-            unserved=0.0,
             solved=True,
         )
 

@@ -43,7 +43,7 @@ from scipy.special import gamma
 from creeping._typing import Any, ComplexArray, FloatArray, IntArray
 from creeping.field.boundary import SOFT, Boundary
 from creeping.field.currents.radiation import field_of_scalar, phase_sums
-from creeping.field.equation.tiles import Tiles, gauss
+from creeping.field.equation.tiles import Near, On, Tiles, gauss
 from creeping.geometry.directions import fibonacci_directions
 from creeping.geometry.patches import differentiation, interpolation, lobatto
 from creeping.kernels.threads import in_threads
@@ -174,7 +174,7 @@ class EdgeTerm:
         above = self.rings.points[nearest] + least[:, None] * self._normals[nearest, 0]
         clear = np.where((away < least)[:, None], above, points)
         both = [
-            field_of_scalar(self.rings.points, self.rings.tangents, None, strength.T, clear, self._k)
+            field_of_scalar((self.rings.points, self.rings.tangents), None, strength.T, clear, self._k)
             for strength in self.of(values, kind)
         ]
         # that is of a source e^{ikR}/(4 pi R)
@@ -209,12 +209,10 @@ class Places(NamedTuple):
     normals: FloatArray
     a: FloatArray
     b: FloatArray
-    own: tuple[IntArray, FloatArray, FloatArray] | None = None
+    own: On | None = None
 
     @classmethod
-    def at(
-        cls, points: FloatArray, normals: FloatArray, own: tuple[IntArray, FloatArray, FloatArray] | None = None
-    ) -> "Places":
+    def at(cls, points: FloatArray, normals: FloatArray, own: On | None = None) -> "Places":
         """Places at points with normals (m, 3)."""
         # where two parts are one but for rounding the first serves, so that mirrored normals have mirrored tangents
         spare = np.eye(3)[np.argmin(np.abs(normals) + TIE * np.arange(3), axis=1)]
@@ -223,7 +221,7 @@ class Places(NamedTuple):
         return cls(points, normals, a, np.cross(normals, a), own)
 
     @classmethod
-    def of(cls, tiles: Tiles, own: tuple[IntArray, FloatArray, FloatArray]) -> "Places":
+    def of(cls, tiles: Tiles, own: On) -> "Places":
         """Places of tiles (m,) at u and v."""
         return cls.at(*tiles.on(*own), own)
 
@@ -368,7 +366,7 @@ class Matrix:
             return targets, columns, np.asarray(double + single[columns] * found[:, 1] if mode else double)
         return targets, columns, np.einsum("pc,pcj->pj", places.normals[targets], found)
 
-    def _near_vectors(self, places: Places, near: tuple[IntArray, IntArray]) -> ComplexArray:
+    def _near_vectors(self, places: Places, near: Near) -> ComplexArray:
         """The integrals of a conductor over tiles near places, of polynomials without their part along the normal.
 
         Between nodes Cartesian components of J have one, and n_x.J of it is no smaller next to x than elsewhere. The
@@ -412,16 +410,6 @@ def _across(found: ComplexArray, of: Places, q: FloatArray) -> ComplexArray:
         along = np.einsum("pc,pcj->pj", p, found)[:, :, None]
         out.append(along * through - np.einsum("px,pjcx->pjc", p, q) * leaning)
     return np.stack(out, axis=1)
-
-
-def _transposed(square: np.ndarray) -> np.ndarray:
-    """A square matrix (n, n) transposed in its place, by blocks that a cache holds."""
-    starts = range(0, len(square), BLOCK)
-    for i in starts:
-        for j in range(i, len(square), BLOCK):
-            upper, lower = square[i : i + BLOCK, j : j + BLOCK], square[j : j + BLOCK, i : i + BLOCK]
-            upper[:], lower[:] = lower.T.copy(), upper.T.copy()
-    return square
 
 
 def second_surface(tiles: Tiles, wavenumber: float) -> tuple[IntArray, FloatArray]:

@@ -58,6 +58,14 @@ def gauss(points: int, *, conical: bool = False) -> tuple[FloatArray, FloatArray
     return 0.5 * (1 + u), 0.5 * w
 
 
+On = tuple[IntArray, FloatArray, FloatArray]
+"""Tiles on which points are (m,), and u and v there."""
+Located = tuple[IntArray, FloatArray, FloatArray, FloatArray]
+"""The same of the nearest places, and the distances from them, L."""
+Near = tuple[IntArray, IntArray]
+"""Where the points near each tile stand (t + 1,), and their numbers (pairs,)."""
+
+
 @dataclass(frozen=True, eq=False)
 class Tiles:
     """Tiles of a body.
@@ -165,7 +173,7 @@ class Tiles:
         counts = cKDTree(self.points).query_ball_point(middles, within, return_length=True)
         return float(np.mean(counts)) * self.count
 
-    def near(self, points: FloatArray) -> tuple[IntArray, IntArray]:
+    def near(self, points: FloatArray) -> Near:
         """Where the points (m, 3) near each tile stand (t + 1,), and their numbers (pairs,)."""
         from scipy.spatial import cKDTree
 
@@ -173,14 +181,7 @@ class Tiles:
         starts = np.concatenate([[0], np.cumsum([len(one) for one in lists])]).astype(np.int64)
         return starts, np.fromiter(chain.from_iterable(lists), np.int64, starts[-1])
 
-    def rows(
-        self,
-        points: FloatArray,
-        near: tuple[IntArray, IntArray],
-        wavenumber: float,
-        mode: int,
-        own: tuple[IntArray, FloatArray, FloatArray] | None = None,
-    ) -> ComplexArray:
+    def rows(self, points: FloatArray, near: Near, wavenumber: float, mode: int, own: On | None = None) -> ComplexArray:
         """Integrals of modes of `creeping.field.kernels.tile_rows` over tiles near points: (pairs, mode + 1, p p).
 
         ``own`` is the tile that each point is on, and u and v there, as of `located` and `own_places`.
@@ -249,12 +250,12 @@ class Tiles:
         return np.asarray(found.reshape(-1, *values.shape[1:]))
 
     @property
-    def own_places(self) -> tuple[IntArray, FloatArray, FloatArray]:
+    def own_places(self) -> On:
         """Tile of each node, and u and v there: (n,) each."""
         at_u, at_v = (part.ravel() for part in np.meshgrid(*self.places, indexing="ij"))
         return np.repeat(np.arange(self.count), self.p**2), np.tile(at_u, self.count), np.tile(at_v, self.count)
 
-    def located(self, points: FloatArray) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
+    def located(self, points: FloatArray) -> Located:
         """The tile nearest to points (m, 3), u and v there, and the distance, L: (m,) each."""
         from scipy.spatial import cKDTree
 
@@ -298,13 +299,7 @@ class Tiles:
             found[some] = angle.sum(axis=1) > 2 * np.pi
         return found
 
-    def _bring(
-        self,
-        points: FloatArray,
-        row: IntArray,
-        tile: IntArray,
-        best: tuple[IntArray, FloatArray, FloatArray, FloatArray],
-    ) -> None:
+    def _bring(self, points: FloatArray, row: IntArray, tile: IntArray, best: Located) -> None:
         """Put into ``best``, as of `located`, what is nearer of points with numbers (n,) on tiles (n,)."""
         if not len(row):
             return

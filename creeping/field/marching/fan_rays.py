@@ -70,7 +70,7 @@ def fan_profiles(fan: RayFan, boundary: Boundary) -> RayProfiles:
         If the body has a speed, or edges.
     """
     checked_plain(fan.body, edgeless="marching along rays of a fan")
-    body, d = fan.body, fan.line.direction
+    body = fan.body
     x0, p0 = fan.points[:, 0], fan.directions[:, 0]
     least = 1 / size(body)
     kappa = normal_curvature(body, x0, p0)
@@ -94,7 +94,7 @@ def fan_profiles(fan: RayFan, boundary: Boundary) -> RayProfiles:
             states = trace_states(body, begin, times, rtol=1e-10)
             own, x = np.broadcast_to(times, states.shape[:2]), states[..., X].reshape(-1, 3)
             nodes = nodes_at(body, x, normal(body, x))
-        ways.append(_along(d, x0, sense * own, nodes, states, sense, boundary))
+        ways.append(_along(fan, boundary, sense * own, nodes, states, sense))
     first, second = ways
     whole = {name: np.concatenate([first[name][:, :0:-1], second[name]], axis=1) for name in first}
     gauss = whole["curvature"] * whole["transverse"] - whole["torsion"] ** 2
@@ -110,19 +110,13 @@ def fan_profiles(fan: RayFan, boundary: Boundary) -> RayProfiles:
 
 
 def _along(
-    d: FloatArray,
-    x0: FloatArray,
-    s: FloatArray,
-    nodes: BodyNodes,
-    states: FloatArray,
-    sense: float,
-    boundary: Boundary,
+    fan: RayFan, boundary: Boundary, s: FloatArray, nodes: BodyNodes, states: FloatArray, sense: float
 ) -> dict[str, Any]:
     """What the states of rays (rays, steps, 10) say, each (rays, steps)."""
-    shape = states.shape[:2]
+    d, shape = fan.line.direction, states.shape[:2]
     x, p = nodes.points, sense * states[..., P].reshape(-1, 3)
     b = np.cross(nodes.normals, p)
-    away = x.reshape(*shape, 3) - x0[:, None]
+    away = x.reshape(*shape, 3) - fan.points[:, :1]
     found: dict[str, Any] = {
         "s": s,
         "curvature": nodes.curvature(p),

@@ -416,61 +416,49 @@ def _coupled(
     waves = [checked_wave(body, one, order, what, boundary) for one in waves]
     y = _checked_ports(body, ports)
     named, name = np.broadcast_to(kinds, len(y)), boundary_name(boundary) if what == "ports" else "pec"
-    # geodesics take a small part of the time: each wave traces its own, of the length that it needs
-    found = [_matrix(body, y, axes, named, k, order, length, name) for k in waves]
-    return found if many else found[0]
-
-
-def _matrix(
-    body: Surface,
-    ports: FloatArray,
-    axes: ArrayLike | None,
-    named: Words,
-    k: float,
-    order: int,
-    length: Length,
-    boundary: str,
-) -> Coupling:
-    """The matrix at one wavenumber."""
-    n, slots = len(ports), named == "slot"
     # checked before fans are traced
-    along = normal(body, ports)
+    slots, along = named == "slot", normal(body, y)
     if axes is not None:
         along[slots] = _tangential(axes, along[slots])
-    rays = port_geodesics(body, ports, k, length)
-    blocks, waves = [], np.zeros(len(rays), dtype=complex)
-    for pair in TENSORS:
-        sources, receivers = (named == kind for kind in pair)
-        if not (np.any(sources) and np.any(receivers)):
-            continue
-        made = path_waves(rays.between(sources, receivers), pair, along, k, order)
-        waves[sources[rays.first] & receivers[rays.second]] = made.values
-        blocks.append((port_sums(made), np.outer(sources, receivers)))
-    whole = blocks[0][0]
-    for block, where in blocks[1:]:
-        whole.put(block, where)
     sign = np.where(named[:, None] == named, 1, -1)
 
     def square(upper: Any, lower: Any, diagonal: Any) -> Any:
-        out = np.where(np.triu(np.ones((n, n), dtype=bool)), upper, lower)
+        out = np.where(np.triu(np.ones(sign.shape, dtype=bool)), upper, lower)
         np.fill_diagonal(out, diagonal)
         return out
 
-    return Coupling(
-        body=body,
-        ports=ports,
-        normals=rays.normals,
-        values=square(whole.values, sign * whole.values.T, np.inf),
-        error=square(whole.error, whole.error.T, np.inf),
-        status=square(whole.status, whole.status.T, int(FieldStatus.CAUSTIC)),
-        method=square(whole.method, whole.method.T, "none"),
-        wavenumber=k,
-        boundary=boundary,
-        order=order,
-        length=rays.length,
-        length_unit=unit_of(body),
-        kinds=named,
-        axes=None if axes is None else along,
-        _rays=rays,
-        _waves=waves,
-    )
+    found = []
+    for k in waves:
+        # geodesics take a small part of the time: each wave traces its own, of the length that it needs
+        rays = port_geodesics(body, y, k, length)
+        blocks, values = [], np.zeros(len(rays), dtype=complex)
+        for pair in TENSORS:
+            sources, receivers = (named == kind for kind in pair)
+            if not (np.any(sources) and np.any(receivers)):
+                continue
+            made = path_waves(rays.between(sources, receivers), pair, along, k, order)
+            values[sources[rays.first] & receivers[rays.second]] = made.values
+            blocks.append((port_sums(made), np.outer(sources, receivers)))
+        whole = blocks[0][0]
+        for block, where in blocks[1:]:
+            whole.put(block, where)
+        one = Coupling(
+            body=body,
+            ports=y,
+            normals=rays.normals,
+            values=square(whole.values, sign * whole.values.T, np.inf),
+            error=square(whole.error, whole.error.T, np.inf),
+            status=square(whole.status, whole.status.T, int(FieldStatus.CAUSTIC)),
+            method=square(whole.method, whole.method.T, "none"),
+            wavenumber=k,
+            boundary=name,
+            order=order,
+            length=rays.length,
+            length_unit=unit_of(body),
+            kinds=named,
+            axes=None if axes is None else along,
+            _rays=rays,
+            _waves=values,
+        )
+        found.append(one)
+    return found if many else found[0]

@@ -27,10 +27,19 @@ from creeping._typing import Any, ArrayLike, ComplexArray, FloatArray
 from creeping._version import __version__
 from creeping.errors import InvalidInputError
 from creeping.field.arguments import checked, checked_plain
-from creeping.field.boundary import CONDUCTOR, Boundary, BoundaryLike, boundary_name, scalar_boundaries
+from creeping.field.boundary import Boundary, BoundaryLike, boundary_name
 from creeping.field.equation.body_tiles import body_tiles
 from creeping.field.equation.currents import inside_points
-from creeping.field.equation.effort import PRODUCTS, Load, fewest_nodes, load_of, load_on, pair_seconds, plan_of
+from creeping.field.equation.effort import (
+    PRODUCTS,
+    Load,
+    equation_boundary,
+    fewest_nodes,
+    load_of,
+    load_on,
+    pair_seconds,
+    plan_of,
+)
 from creeping.field.equation.matrix import Matrix
 from creeping.field.equation.mirrors import mirrors_of, no_mirrors
 from creeping.field.tmatrix.result import TMatrix
@@ -122,9 +131,8 @@ def t_matrix(
     (['t-matrix', 't-matrix'], True)
     """
     checked_plain(body)
-    kinds = scalar_boundaries(boundary)
+    kind = equation_boundary(boundary)
     k = checked(wavenumber, 2, body)
-    kind = CONDUCTOR if len(kinds) == 2 else kinds[0]
     middle = _center(body, center)
     highest = None if order is None else whole_number(order, "order")
 
@@ -144,7 +152,7 @@ def t_matrix(
     with telling(progress) as tell:
         if store is None:
             return made(*_computed(body, k, kind, middle, highest, seconds, tell, not_kept))
-        if kinds[0].varies:
+        if kind.varies:
             raise InvalidInputError("a store cannot identify an admittance that varies; leave out store=")
         key = {"body": fingerprint(body), "wavenumber": k, "boundary": boundary_name(boundary), "order": highest}
         parts = Parts(folder_path(store, "store"), key | {"center": middle.tolist(), "version": __version__})
@@ -225,8 +233,7 @@ def plan_for(load: Load, kind: Boundary, order: int, parts: int = 1) -> Plan:
 
 def expected(body: Surface, wavenumber: float, boundary: BoundaryLike) -> Plan:
     """What the T-matrix of a body takes, by the nodes that its equation has."""
-    kinds = scalar_boundaries(boundary)
-    kind = CONDUCTOR if len(kinds) == 2 else kinds[0]
+    kind = equation_boundary(boundary)
     if (least := _least_bytes(body, wavenumber, kind, None)) > budget():
         return Plan(np.inf, least, False)
     load = load_of(body, FINER * wavenumber, kind)

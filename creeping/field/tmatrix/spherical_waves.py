@@ -108,7 +108,7 @@ def regular(points: FloatArray, wavenumber: float, order: int, *, radial: bool =
     return out
 
 
-def _ladder(order: int, up: IntArray, coefficients: FloatArray, low: FloatArray, m_step: int) -> Any:
+def _ladder(order: int, coefficients: FloatArray, low: FloatArray, m_step: int) -> Any:
     """Sparse matrix of psi_lm -> ``low`` psi_(l-1, m+step) - ``coefficients`` psi_(l+1, m+step)."""
     from scipy.sparse import csr_array
 
@@ -135,27 +135,14 @@ def gradients(order: int) -> tuple[Any, Any, Any]:
     """
     deg, m = (part.astype(float) for part in degrees(order))
     above, below = (2 * deg + 1) * (2 * deg + 3), np.maximum((2 * deg - 1) * (2 * deg + 1), 1.0)
-    number = np.arange(len(deg))
-    z = _ladder(
-        order,
-        number,
-        np.sqrt(((deg + 1) ** 2 - m**2) / above),
-        np.sqrt(np.maximum(deg**2 - m**2, 0.0) / below),
-        0,
-    )
-    plus = _ladder(
-        order,
-        number,
-        -np.sqrt((deg + m + 1) * (deg + m + 2) / above),
-        np.sqrt(np.maximum((deg - m) * (deg - m - 1), 0.0) / below),
-        1,
-    )
-    minus = _ladder(
-        order,
-        number,
-        np.sqrt((deg - m + 1) * (deg - m + 2) / above),
-        -np.sqrt(np.maximum((deg + m) * (deg + m - 1), 0.0) / below),
-        -1,
+    # signs and squares of what goes up a degree and down one, and the step of m
+    z, plus, minus = (
+        _ladder(order, up * np.sqrt(above_one / above), down * np.sqrt(np.maximum(below_one, 0.0) / below), step)
+        for up, above_one, down, below_one, step in (
+            (1, (deg + 1) ** 2 - m**2, 1, deg**2 - m**2, 0),
+            (-1, (deg + m + 1) * (deg + m + 2), 1, (deg - m) * (deg - m - 1), 1),
+            (1, (deg - m + 1) * (deg - m + 2), -1, (deg + m) * (deg + m - 1), -1),
+        )
     )
     return 0.5 * (plus + minus), -0.5j * (plus - minus), z
 
@@ -177,15 +164,13 @@ def momenta(order: int) -> tuple[Any, Any, Any]:
 @cache
 def vector_parts(order: int) -> tuple[Any, Any, Any]:
     """x, y and z components of vector waves as scalar ones: sparse ((order + 2)^2, 2 order (order + 2)) each."""
-    from scipy.sparse import csr_array, hstack
+    from scipy.sparse import csr_array, eye_array, hstack
 
     deg, _ = degrees(order)
     share = 1 / np.sqrt(np.maximum(deg * (deg + 1.0), 1.0))
     M = [csr_array(part * share[None])[:, 1:] for part in momenta(order)]
     D = gradients(order)
-    lift = csr_array(
-        (np.ones(count(order), dtype=complex), (np.arange(count(order)),) * 2), (count(order + 1), count(order))
-    )
+    lift = eye_array(count(order + 1), count(order), dtype=complex, format="csr")
     parts = []
     n = count(order) - 1
     mixed = np.stack([np.arange(n), n + np.arange(n)], axis=1).ravel()
@@ -218,21 +203,17 @@ def far_vectors(directions: FloatArray, order: int) -> ComplexArray:
     share = 1 / np.sqrt(np.maximum(deg * (deg + 1.0), 1.0))
     Y = harmonics(directions, order)
     X = np.stack([combined(Y, momenta(order), frame[:, c]) for c in (0, 1)], axis=1) * share
-    return _both(X[:, :, 1:])
+    out = np.empty((len(X), 2, 2 * X.shape[2] - 2), dtype=complex)
+    # i r cross X
+    out[:, 0, 0::2], out[:, 1, 0::2] = -1j * X[:, 1, 1:], 1j * X[:, 0, 1:]
+    out[:, :, 1::2] = X[:, :, 1:]
+    return out
 
 
 def far_profiles(theta: FloatArray, order: int, *, vector: bool) -> ComplexArray:
     """What waves are far away at phi = 0 and polar angles (n,): (n, c, waves), c = 1 or theta and phi."""
     x = np.stack([np.sin(theta), np.zeros_like(theta), np.cos(theta)], axis=1)
     return far_vectors(x, order) if vector else harmonics(x, order)[:, None].copy()
-
-
-def _both(X: ComplexArray) -> ComplexArray:
-    """Electric and magnetic waves in turn (n, 2, 2s), of X along theta and phi (n, 2, s)."""
-    out = np.empty((*X.shape[:2], 2 * X.shape[2]), dtype=complex)
-    out[:, 0, 0::2], out[:, 1, 0::2] = -1j * X[:, 1], 1j * X[:, 0]
-    out[:, :, 1::2] = X
-    return out
 
 
 def parities(order: int, flips: tuple[tuple[int, ...], ...], *, vector: bool) -> tuple[Any, IntArray]:

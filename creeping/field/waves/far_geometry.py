@@ -168,8 +168,6 @@ class FarGeometry:
         self.unserved = 1 - attached[self.incidence]
         self._forward = forward
         self._lobes: dict[tuple[int, bytes], tuple[HorizonRays, MidHorizon, IntArray]] = {}
-        self._nodes: dict[bytes, HorizonRays] = {}
-        self._fold: tuple[float, FloatArray] | None = None
         self._search()
 
     @cached_property
@@ -296,10 +294,8 @@ class FarGeometry:
 
     def fold(self, wavenumber: float) -> FloatArray:
         """What specular points miss at a caustic of the reflected field (n m,), L; that of the last k is kept."""
-        if self._fold is None or self._fold[0] != wavenumber:
-            where = self.body, prepared(self.body).coarsest, self.direction, self.directions
-            self._fold = wavenumber, fold_error(*where, wavenumber)
-        return self._fold[1]
+        where = self.body, prepared(self.body).coarsest, self.direction, self.directions
+        return memo_of(self, "fold", wavenumber, lambda: fold_error(*where, wavenumber), 1)
 
     @cached_property
     def typical(self) -> float:
@@ -313,9 +309,7 @@ class FarGeometry:
         # rays stand for themselves unless too far apart; powers of two, so that frequencies share them
         parts = 2 ** np.ceil(np.log2(np.maximum(wavenumber * widest / APART, 1.0)) - 1e-9).astype(np.int64)
         key = parts.tobytes() + wanted.tobytes()
-        if key not in self._nodes:
-            self._nodes[key] = self._fan_nodes(parts, wanted)
-        return self._nodes[key]
+        return memo_of(self, "fan nodes", key, lambda: self._fan_nodes(parts, wanted), 64)
 
     def _fan_nodes(self, parts: IntArray, wanted: BoolArray) -> HorizonRays:
         row, ray = self._crossed[:, :2].astype(np.int64).T

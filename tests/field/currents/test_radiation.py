@@ -68,14 +68,14 @@ def test_exact_currents_radiate_the_exact_field(boundary, rng):
     if boundary != "hard":
         slope = sphere.surface_derivative(K, 1.0, c, boundary) * nodes.weights
     r = directions(rng, 100)
-    f = far_of_scalar(nodes.points, nodes.normals, u, slope, r, K)
+    f = far_of_scalar((nodes.points, nodes.normals), u, slope, r, K)
     exact = sphere.far_field(K, 1.0, r @ D, boundary)
     np.testing.assert_allclose(f, exact, atol=1e-6 * np.abs(exact).max())
     # inside they cancel the wave, outside they are the scattered field
     inside = 0.5 * directions(rng, 40)
-    left = field_of_scalar(nodes.points, nodes.normals, u, slope, inside, K) + np.exp(1j * K * (inside @ D))
+    left = field_of_scalar((nodes.points, nodes.normals), u, slope, inside, K) + np.exp(1j * K * (inside @ D))
     assert np.max(np.abs(left)) < 1e-6
     outside = 1.7 * directions(rng, 40)
-    field = field_of_scalar(nodes.points, nodes.normals, u, slope, outside, K) + np.exp(1j * K * (outside @ D))
+    field = field_of_scalar((nodes.points, nodes.normals), u, slope, outside, K) + np.exp(1j * K * (outside @ D))
     exact = sphere.total_field(K, 1.0, outside, D, boundary)
     np.testing.assert_allclose(field, exact, atol=1e-6)
