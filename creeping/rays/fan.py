@@ -123,6 +123,18 @@ class RayFan(DrawnOnBody):
         return {s.name: int(np.sum(self.status == s)) for s in RayStatus if np.any(self.status == s)}
 
     @property
+    def largest_gap(self) -> float:
+        """Largest distance between neighbouring rays at any step, L; 0 if no arc has two rays."""
+        widest = 0.0
+        for arc, closed in enumerate(self.closed_arcs):
+            rays = self.points[self.arc_index == arc]
+            if len(rays) > 1:
+                following = np.roll(rays, -1, axis=0)[: None if closed else -1]
+                apart = np.linalg.norm(following - rays[: len(following)], axis=-1)
+                widest = max(widest, float(np.nanmax(apart, initial=0.0)))
+        return widest
+
+    @property
     def launched(self) -> BoolArray:
         """Whether the incident wave launched each ray, even if the ray ended early: (rays,)."""
         return np.isin(self.status, (RayStatus.OK, *ENDED))
@@ -206,7 +218,8 @@ def launch(
         and concave points too, as in Figure 6 of Ying and Candes 2006.
     max_gap : float, optional
         Rays are inserted until neighbours stay closer than this, L. By default 0.1 body sizes; inf inserts none.
-        Insertion stops at 32 times as many rays or, next to edges, at a 16th of a gap.
+        Insertion stops at 32 times as many rays or, next to edges, at a 16th of a gap; `RayFan.largest_gap` gives the
+        gap that remains.
     measured : bool
         Whether to measure the error at the end of the rays.
 

@@ -88,6 +88,12 @@ class ConductorField(PointData):
         return np.asarray(np.maximum(np.linalg.norm(self.E, axis=axis), np.linalg.norm(self.H, axis=axis)))
 
     @property
+    def power_flow(self) -> FloatArray:
+        """Re E x H*: time-averaged power flow in units of the incident power flow, (..., 3) or (..., 3, 2)."""
+        axis = self.points.ndim - 1
+        return np.asarray(np.cross(self.E, self.H.conj(), axis=axis).real)
+
+    @property
     def unit(self) -> str:
         """Unit of the values."""
         return "of the incident E"

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -32,9 +32,11 @@ from creeping.field.tmatrix.patterns import (
     Sections,
     backward_series,
     received,
+    recentred,
     sent,
+    turned,
 )
-from creeping.geometry.arguments import flag
+from creeping.geometry.arguments import flag, real_array, whole_number
 from creeping.geometry.directions import angles_of, unit_directions
 from creeping.storage.memory import blocks, within_budget
 
@@ -42,6 +44,8 @@ if TYPE_CHECKING:
     import xarray
 
 METHOD = "t-matrix"
+ORTHOGONAL = 1e-9
+"""What a rotation may lack of being one."""
 PAIRS = 4096
 """Pairs of directions that are summed together."""
 VALUE = 80.0
@@ -318,6 +322,58 @@ class TMatrix(Drawn):
             # of components that err in phase with the field
             error=4 * np.pi * float((np.sqrt(mean) + np.sqrt(c) * self._lack.backward) ** 2 - mean),
         )
+
+    # --- other places
+
+    def rotate(self, rotation: ArrayLike) -> TMatrix:
+        """T-matrix of the body rotated about the origin: R (3, 3) takes each point x, L, to R x.
+
+        Raises
+        ------
+        InvalidInputError
+            If the matrix is not a rotation.
+        """
+        R = real_array(rotation, "rotation")
+        if R.shape != (3, 3) or np.max(np.abs(R @ R.T - np.eye(3))) > ORTHOGONAL or np.linalg.det(R) < 0:
+            raise InvalidInputError("rotation is no rotation: give a matrix (3, 3) with R R^T = 1 and determinant 1")
+        T = turned(self.matrix, R, self.order, vector=self.vector)
+        return replace(self, matrix=T, center=R @ self.center, body=self._moved("turned"))
+
+    def translate(self, shift: ArrayLike) -> TMatrix:
+        """T-matrix of the body shifted by a vector (3,), L; the centre of the waves moves with the body.
+
+        Raises
+        ------
+        InvalidInputError
+            If the vector is not three numbers.
+        """
+        v = real_array(shift, "shift")
+        if v.shape != (3,):
+            raise InvalidInputError(f"shift has shape {v.shape}; give three numbers")
+        return replace(self, center=self.center + v, body=self._moved("moved"))
+
+    def about(self, center: ArrayLike, order: int | None = None) -> TMatrix:
+        """T-matrix of the same body in spherical waves about another centre (3,), L.
+
+        By default the order grows by k times the distance of the two centres.
+
+        Raises
+        ------
+        InvalidInputError
+            If the centre is not three numbers, the order is not a whole number, or the matrix is too large.
+        """
+        c = real_array(center, "center")
+        if c.shape != (3,):
+            raise InvalidInputError(f"center has shape {c.shape}; give three numbers")
+        shift = c - self.center
+        larger = self.order + int(np.ceil(self.wavenumber * np.linalg.norm(shift)))
+        larger = larger if order is None else whole_number(order, "order")
+        within_budget(48.0 * self._waves(larger) ** 2, f"waves of order {larger}", "give a lower order=")
+        T = recentred(self.matrix, self.wavenumber, shift, self.order, larger, vector=self.vector)
+        return replace(self, matrix=T, center=c)
+
+    def _moved(self, how: str) -> str:
+        return self.body if not self.body or self.body.endswith(how) else f"{self.body}, {how}"
 
     # --- other shapes
 

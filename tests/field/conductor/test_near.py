@@ -53,6 +53,7 @@ def test_parts_add_up(field, places, ball):
     alone = field.method[:, 0] != "rays"
     flow = np.cross(field.incident.E[alone, :, 0], field.incident.H[alone, :, 0].conj()).real
     np.testing.assert_allclose(flow, np.broadcast_to(OBLIQUE, flow.shape), atol=1e-12)
+    assert field.power_flow.shape == field.E.shape
 
 
 @pytest.mark.slow

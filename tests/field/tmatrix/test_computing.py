@@ -144,6 +144,7 @@ def test_another_centre_is_the_same_body():
     one = cr.t_matrix(body, wavenumber=2.0, boundary="soft")
     other = cr.t_matrix(body, wavenumber=2.0, boundary="soft", center=(0.1, 0.0, 0.3), order=8)
     assert np.abs(one.bistatic(D, R).values - other.bistatic(D, R).values).max() < 1e-4
+    assert np.abs(other.about((0, 0, 0), one.order).matrix - one.matrix).max() < 1e-5
 
 
 def test_progress_is_told():

@@ -1,4 +1,4 @@
-"""What is asked of a T-matrix: far fields, cross sections, averages."""
+"""What is asked of a T-matrix: far fields, cross sections, averages, turned and moved bodies."""
 
 from dataclasses import replace
 
@@ -7,10 +7,12 @@ import pytest
 
 import creeping as cr
 import scatterers as sc
+from creeping.field.results.far_result import spherical_frame
 
 RNG = np.random.default_rng(4)
 D, R = RNG.normal(size=(2, 6, 3))
 POLES = np.array([[0, 0, 1.0], [0, 0, -1.0], [0.1, 0.2, 0.3], [1, 0, 0]])
+TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 
 
 @pytest.fixture(name="T", scope="module", params=["hard", "pec"])
@@ -21,6 +23,13 @@ def of_an_ellipsoid(request):
 
 def unit(x):
     return x / np.linalg.norm(x, axis=-1, keepdims=True)
+
+
+def vectors(values, d, r):
+    """Far fields (m, n, ...) as vectors or numbers that do not depend on frames."""
+    if values.ndim == 2:
+        return values
+    return np.einsum("nox,mnoi,miy->mnxy", spherical_frame(unit(r)), values, spherical_frame(unit(d)))
 
 
 def test_pairs_are_those_of_all_with_all(T):
@@ -69,6 +78,33 @@ def test_averages_are_means_over_directions(T):
     backscattering = 4 * np.pi * np.mean(np.sum(np.abs(back) ** 2, axis=1)) / share
     assert averages.backscattering == pytest.approx(backscattering, rel=1e-4)
     assert averages.target_strength == pytest.approx(10 * np.log10(backscattering / (4 * np.pi)), abs=1e-3)
+    turned = T.rotate(TURN).orientation_average()
+    assert np.allclose(averages, turned, rtol=1e-9)
+
+
+def test_a_turned_body_scatters_turned_waves(T):
+    turned = T.rotate(TURN)
+    want = vectors(T.bistatic(D, R).values, D, R)
+    found = vectors(turned.bistatic(D @ TURN.T, R @ TURN.T).values, D @ TURN.T, R @ TURN.T)
+    if T.vector:
+        want = np.einsum("ax,mnxy,by->mnab", TURN, want, TURN)
+    assert np.abs(found - want).max() < 1e-11 and np.allclose(turned.center, TURN @ T.center)
+    assert np.abs(turned.rotate(TURN.T).matrix - T.matrix).max() < 1e-12
+    assert turned.reciprocity == pytest.approx(T.reciprocity, rel=1e-4)
+
+
+def test_a_moved_body_has_phases(T):
+    v = np.array([0.3, -0.2, 0.5])
+    phase = np.exp(1j * T.wavenumber * ((unit(D) @ v)[:, None] - unit(R) @ v))
+    want = T.bistatic(D, R).values * phase.reshape(6, 6, *(1, 1)[: 2 * T.vector])
+    assert np.abs(T.translate(v).bistatic(D, R).values - want).max() < 1e-12
+
+
+def test_another_centre_is_the_same_field(T):
+    moved = T.about((0.2, -0.3, 0.1), T.order + 6)
+    assert np.abs(moved.bistatic(D, R).values - T.bistatic(D, R).values).max() < 1e-5
+    assert np.abs(moved.about(T.center, T.order).matrix - T.matrix).max() < 1e-5
+    assert T.about((0.2, -0.3, 0.1)).order == T.order + 1
 
 
 def test_reciprocity_sees_what_is_not_reciprocal(T):
@@ -96,6 +132,11 @@ def test_bad_questions_are_refused(T):
         T.bistatic(D, R[:2], pairs=True)
     with pytest.raises(cr.InvalidInputError, match="is zero"):
         T.backscatter([(0, 0, 0)])
+    with pytest.raises(cr.InvalidInputError, match="no rotation"):
+        T.rotate(-np.eye(3))
+    for call in (T.translate, T.about):
+        with pytest.raises(cr.InvalidInputError, match="three numbers"):
+            call((0, 0))
     with pytest.raises(cr.InvalidInputError, match="not finite"):
         replace(T, matrix=T.matrix * np.nan)
     with pytest.raises(cr.InvalidInputError, match="shape"):
