@@ -33,6 +33,7 @@ def test_the_mean_of_a_sphere_is_that_of_its_series(tmp_path, capsys):
     assert summary["complete"] and sorted(p.name for p in tmp_path.iterdir()) == sorted(summary["files"])
 
 
+@pytest.mark.slow
 def test_interrupted_it_says_what_is_missing_and_goes_on_to_the_same_bytes(tmp_path, monkeypatch):
     monkeypatch.setattr("creeping.commands.resuming.EVERY", 0.0)
     words = ["ts", *WORDS, "--frequency", "1:3:1kHz", "--no-pictures"]

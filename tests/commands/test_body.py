@@ -31,6 +31,7 @@ def cube(tmp_path_factory):
 SHORT = ["--direction", 0.1, 0.2, 1, "--flow", "direct", "--rays", 16, "--backend", "matplotlib"]
 
 
+@pytest.mark.slow
 def test_run_with_an_expression(tmp_path, capsys):
     body = "x**2 + y**2 + 4*z**2 - 1"
     code, out, err = creeping("run", body, *SHORT, "--length", 0.5, "--no-pictures", "-o", tmp_path, capsys=capsys)
@@ -121,6 +122,7 @@ def test_check_of_a_cube_gives_its_quality(cube, tmp_path, capsys):
     assert answer["quality"]["verdict"] == "sharp" and "not smooth enough" in answer["refused"]
 
 
+@pytest.mark.slow
 def test_a_cube_is_taken_in_pieces(cube, tmp_path, capsys):
     code, out, err = creeping("check", cube, "--units", "m", "--json", capsys=capsys)
     answer = json.loads(out)

@@ -50,6 +50,7 @@ def test_band_of_a_sphere_with_a_comparison(tmp_path, capsys, monkeypatch):
         assert title.startswith("sphere:radius=0.15, azimuth 0°, elevation 0°; error ") and title.endswith("median")
 
 
+@pytest.mark.slow
 def test_map_of_target_strength_without_pictures(tmp_path, capsys):
     words = ["ellipsoid:a=0.06,b=0.05,c=0.04", "--sound-speed", 1477, "--frequency", "200:220:20kHz"]
     words += ["--boundary", "hard", "--monostatic", "az:0:20:10", "--no-pictures", "--json", "--no-cache"]
@@ -109,6 +110,7 @@ def test_a_comparison_that_fails_costs_no_results(tmp_path, capsys):
         assert "--align" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_azimuths_of_another_turn_are_compared_and_polar_angles_are_not(tmp_path, capsys):
     """A sphere's echo is the same all round: pi radius^2 by optics, given at -3, -2, -1 degrees as 357, 358, 359."""
     words = ["sphere:radius=0.15", "--frequency", "9GHz", "--polarisation", "VV", "--no-pictures", "--no-cache"]

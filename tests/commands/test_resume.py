@@ -63,6 +63,7 @@ def test_ended_at_random_moments_it_comes_to_the_same_bytes(tmp_path, monkeypatc
     assert ran(*words, "-o", out, "--resume") == 0 and "nothing is missing" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_one_that_is_ended_tells_how_to_go_on(tmp_path, monkeypatch, capsys):
     real, calls = blocks.sweep_directions, []
 
@@ -113,6 +114,7 @@ def test_killed_20_times_it_comes_to_the_same_bytes(tmp_path, words):
         assert files(out) == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("by", ["rays", "currents"])
 def test_a_grid_of_directions_goes_on(tmp_path, monkeypatch, capsys, by):
     words = ["run", "sphere", "--direction", 1, 0, 0, "--wavenumber", 30, "--observe", "grid:30", "--no-pictures"]

@@ -18,6 +18,7 @@ from tests.reference import sphere
 X = (1.0, 0.0, 0.0)
 
 
+@pytest.mark.slow
 def test_a_frequency_is_in_metres_and_dbsm(tmp_path, capsys):
     options = ["--direction", 0, 0, 1, "--flow", "direct", "--rays", 32, "--length", "0.5", "--no-pictures"]
     field = ["--frequency", "6GHz", "--boundary", "pec", "--observe", "backscatter", "--observe", "cut:0:90"]

@@ -35,6 +35,7 @@ def test_planes_are_written(tmp_path, capsys):
     assert np.median(np.abs(values[away] - exact)) < 0.03
 
 
+@pytest.mark.slow
 def test_tables_for_matlab_hold_what_the_others_hold(tmp_path, capsys):
     options = ["--direction", 0, 0, 1, "--flow", "direct", "--rays", 16, "--wavenumber", 12, "--no-pictures"]
     options += ["--observe", "cut:0:30", "--observe", "backscatter", "--plane", "xz:0.5", "-o", tmp_path]

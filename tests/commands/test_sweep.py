@@ -75,6 +75,7 @@ def test_a_second_run_needs_resume_and_a_changed_study_another_place(sweep, tmp_
     assert code == 0 and json.loads(out)["output"] == str(tmp_path / "b.zarr")
 
 
+@pytest.mark.slow
 def test_damage_is_renewed_by_verify(sweep, tmp_path):
     sweep()
     victim = tmp_path / "out/rays.zarr/points/c/1/0/0/0"

@@ -70,6 +70,7 @@ def test_parts_and_creases():
     assert [len(piece.samples) > 10 for piece in pieces_of(sc.Cone(0.5, 1.0))] == [True, True]
 
 
+@pytest.mark.slow
 def test_sweep_of_rays_is_that_of_each_fan():
     body, d = CUT, np.array([[1.0, 0, 0.2], [0, 0, 1.0]])
     flow = cr.DirectFlow(body, rtol=1e-9)

@@ -84,6 +84,7 @@ def test_a_newer_wish_ends_the_work():
     assert len(asked) == 2
 
 
+@pytest.mark.slow
 def test_the_cut_of_a_sphere_is_near_the_partial_waves():
     from tests.reference import sphere
 

@@ -57,6 +57,7 @@ def refined_view(page):
     until(lambda: page.found.content, lambda: page.status.content)
 
 
+@pytest.mark.slow
 def test_rays_on_the_page_are_those_of_the_engine(page, browser):
     browser.open(page.address)
     first = rays_of(page)

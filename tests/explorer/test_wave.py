@@ -66,6 +66,7 @@ def test_colours_are_crests_and_troughs_of_the_range():
     np.testing.assert_allclose(at_phase(half, np.pi / 2), 0.5)
 
 
+@pytest.mark.slow
 def test_the_wave_on_the_body_is_that_of_the_series():
     body, request = sc.Sphere(), REQUEST.changed(theta=0.0, phi=0.0, length=6.0, rays=64)
     mesh = triangulate(body, cells=10)
@@ -106,6 +107,7 @@ def page():
     made.close()
 
 
+@pytest.mark.slow
 def test_playing_computes_no_field(page, monkeypatch):
     from creeping.explorer import frames as module
 

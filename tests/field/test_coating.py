@@ -96,6 +96,7 @@ def test_far_and_near_fields_are_those_of_the_exact_sphere(fan):
     assert np.allclose(scattered * 2e4 * np.exp(-2e4j * K), far.total[:20], atol=2e-3 * np.max(np.abs(exact)))
 
 
+@pytest.mark.slow
 def test_a_function_that_is_constant_is_a_constant(fan):
     points = spread(60)
     lit = points @ D < -0.4

@@ -47,6 +47,7 @@ def test_delays_come_round():
         assert found.arrivals(1) == pytest.approx([1.0], abs=1e-3)
 
 
+@pytest.mark.slow
 def test_creeping_paths_on_a_sphere_have_their_lengths():
     # to (x, 0, z) in the shadow: tangents from the two points where rays are shed, and arcs to them from the equator
     k = np.linspace(10.0, 50.0, 81)

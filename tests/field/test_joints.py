@@ -53,6 +53,7 @@ def test_far_field_is_by_the_equation_and_better_than_rays():
     assert np.max(off["rays"]) > 3 * np.max(off["auto"])
 
 
+@pytest.mark.slow
 def test_each_ray_crosses_joints():
     """Along a ray the wave has no jump where it passes a joint, though the curvature does."""
     fan = fan_of(PILL, (0.8, 0.1, 0.4))
@@ -66,6 +67,7 @@ def test_each_ray_crosses_joints():
         cr.surface_field(fan, wavenumber=20.0, boundary="hard", order=1)
 
 
+@pytest.mark.slow
 def test_the_unit_of_length_is_no_matter(monkeypatch):
     monkeypatch.setattr(routes, "affordable", lambda *_, **__: False)
     monkeypatch.setattr(effort, "SECONDS", 0.0)

@@ -46,6 +46,7 @@ def test_focus_behind_a_sphere(ball, k, limit, boundary, monkeypatch):
     assert set(found.method) <= {"march", "rays"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("boundary", ["soft", "hard"])
 def test_cusped_caustic_of_an_ellipsoid(boundary):
     """Points of the whole shadow of a body that nothing here was set on, none left out; modes are infinite between."""
@@ -84,6 +85,7 @@ def test_where_rays_have_ended(monkeypatch):
     assert not np.any(modes.ok) and np.mean(np.abs(np.asarray(found) - exact) <= found.error) > 0.9
 
 
+@pytest.mark.slow
 def test_ground_that_the_body_hides():
     """Behind the waist of a peanut along the wave the field is nearly the incident one, and no creeping ray comes."""
     peanut, k = sc.Implicit("(x**2 + y**2 + z**2 + 0.64)**2 - 2.56*x**2 - 0.9**4"), 20.0

@@ -137,6 +137,7 @@ def test_what_comes_from_elsewhere_is_bounded_where_it_cannot_be_measured(torus,
     assert high.status_counts == {"UNRESOLVED": 2} and set(high.error_by) == {"bound"} and np.all(high.error >= 2)
 
 
+@pytest.mark.slow
 def test_a_body_too_thin_to_look_inside_has_bounds(monkeypatch, torus):
     from creeping.field import routes
 

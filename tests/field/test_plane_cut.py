@@ -69,6 +69,7 @@ def test_labels_keep_the_grid(cut):
     assert np.all(data["status"].values[~cut.outside] == -1)
 
 
+@pytest.mark.slow
 def test_default_plane_and_step(fan):
     body = sc.Ellipsoid(0.5, 1.5, 0.6)
     line = cr.shadow_line(body, (1, 0, 0))

@@ -33,6 +33,7 @@ def coupled(ports):
     return of, {kind: of(kind) for kind in ("ports", "slots")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "changes", "share"),
     [

@@ -26,6 +26,7 @@ def cylinder_ratio(ka):
     return hard / soft
 
 
+@pytest.mark.slow
 def test_both_polarisations_of_a_long_spheroid_at_broadside_are_those_of_the_cylinder():
     # the spheroid's own curvature along is 1/900 of that across; components are along theta (E along z) and phi
     k = 150.0

@@ -25,6 +25,7 @@ def found(ports, points, source, here):
     return cr.slot_coupling(BODY, np.concatenate([ports, points]), np.concatenate([source, here]), wavenumber=K)
 
 
+@pytest.mark.slow
 def test_ellipsoid_against_dipoles_inside(exact):
     """The reference errs by some parts of a thousand of the largest component."""
     ports, points, there, values = exact

@@ -17,6 +17,7 @@ def flow():
     return cr.DirectFlow(sc.Sphere(), rtol=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("boundary", ["soft", "hard"])
 def test_sphere_at_all_distances(flow, boundary):
     place = np.array([0.36, -0.48, 0.8])

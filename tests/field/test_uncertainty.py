@@ -56,6 +56,7 @@ def test_a_coarser_body_of_another_size_has_the_field_of_another_frequency(bound
     assert found.max() > 1e-3 * np.abs(mine).max()
 
 
+@pytest.mark.slow
 def test_what_a_body_errs_by_more_is_in_its_field():
     more = Unsure(BODY, COARSE_FIT)
     more.coarse_factor = 3.0

@@ -128,6 +128,7 @@ def ball_fan():
     return cr.launch(cr.DirectFlow(ball, rtol=1e-8), line, length=2.0, n_rays=16)
 
 
+@pytest.mark.slow
 def test_matlab_of_a_plane(ball_fan, tmp_path):
     assert loaded(tmp_path, [])["points"].size == 0
     cut = cr.field_cut(ball_fan, wavenumber=30.0, boundary="pec", extent=(3.0, 4.0), step=0.8, polarisation="theta")

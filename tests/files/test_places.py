@@ -100,6 +100,7 @@ def test_a_file_that_may_not_be_written_stays(tmp_path):
     assert path.read_text() == "old"
 
 
+@pytest.mark.slow
 def test_standard_output_is_written_to_wherever_it_leads(tmp_path):
     # a file that a process holds open is not replaced: what else it writes there would be lost
     out = tmp_path / "out.txt"

@@ -45,6 +45,7 @@ def test_spline_order_on_six_charts(degree):
     assert slope(1 / cells, errors) == pytest.approx(degree + 1, abs=ORDER if degree == 3 else 2 * ORDER)
 
 
+@pytest.mark.slow
 def test_burn_in_order():
     body = sc.Torus()
     steps = np.array([2.0**-3, 2.0**-4, 2.0**-5])

@@ -152,6 +152,7 @@ def test_fingerprint_of_a_body_that_has_none():
     assert fingerprint(plain(1.0)) != fingerprint(plain(1.0001))
 
 
+@pytest.mark.slow
 def test_second_process_waits_and_opens_the_same_map(tmp_path):
     code = (
         "import creeping as cr, scatterers as sc\n"

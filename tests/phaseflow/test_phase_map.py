@@ -62,6 +62,7 @@ def test_models_of_bodies_and_one_leap_by_splines_of_either_degree(body, degree,
     assert flow.model.name == (revolved if turns else "octant" if mirrored else "rotation")
 
 
+@pytest.mark.slow
 def test_folded_map_equals_the_whole(rng):
     body = sc.Ellipsoid(1.0, 0.8, 0.6)
     states = pack(*random_bundle_points(body, 500, rng=rng), lanes=12)

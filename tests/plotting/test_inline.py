@@ -47,6 +47,7 @@ def test_axes_of_pyplot_stay_its_own(twisted_fan):
         pyplot.close(figure)
 
 
+@pytest.mark.slow
 def test_a_script_that_plots_imports_no_pyplot():
     code = (
         "import sys, creeping as cr, scatterers as sc;"

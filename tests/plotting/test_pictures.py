@@ -20,6 +20,7 @@ def pixels(path):
     return np.asarray(imread(path))[..., :3]
 
 
+@pytest.mark.slow
 def test_both_backends_draw_the_same(tmp_path, opengl, sphere_line, sphere_fan, sphere_curves):
     images = []
     for backend in ("matplotlib", "pyvista"):

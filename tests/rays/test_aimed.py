@@ -80,6 +80,7 @@ def test_rays_that_are_found_go_back_to_the_wave():
     np.testing.assert_allclose(back[on, P], np.broadcast_to(-d, (on.sum(), 3)), atol=1e-5)
 
 
+@pytest.mark.slow
 def test_rays_of_a_thin_body_do_not_hang_on_the_number_that_a_fan_has():
     """One search of a hundred comes no nearer for five rounds, and then does."""
     body, d = sc.Ellipsoid(1.0, 0.7, 0.2), np.array([0.2, -0.9, 0.3])

@@ -187,6 +187,7 @@ def test_error_goes_with_the_difference_of_the_bodies():
     assert 1e-4 < found[0].points < 1e-2
 
 
+@pytest.mark.slow
 def test_a_body_says_by_how_much_it_errs_and_rays_that_end_are_left_out():
     one, two = (
         body_uncertainty(fan_of(Wrapped(coarse_fit=COARSE_FIT, coarse_factor=factor)), n_rays=6)

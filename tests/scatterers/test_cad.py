@@ -197,6 +197,7 @@ def test_parts_of_a_cad_file_are_chosen(files):
     assert largest.repairs == ("part 1 of 2 of two.brep taken; 20 % of its area left out",)
 
 
+@pytest.mark.slow
 def test_parts_that_cross_are_united(files):
     whole = parted(files / "crossing.brep", union=True)
     # six faces each, and edges where they cross as well
@@ -344,6 +345,7 @@ def test_ellipsoid_against_the_exact_one(files):
     assert cr.shadow_line(body, (1.0, 1.0, 1.0)).length == pytest.approx(6.1340508514, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_ends_that_are_sharper_than_their_points_are_followed_by_normals(files):
     """Radius 3 mm, points 4 mm apart: jets make nothing of it, normals of the faces do."""
     body, exact = sc.Cad(files / "flat.step", points=3000, cache=False), sc.Ellipsoid(0.126, 0.049, 0.02)

@@ -124,6 +124,7 @@ def test_order_of_the_curvature():
     assert np.log(off[0] / off[1]) / np.log(edges[0] / edges[1]) > 3
 
 
+@pytest.mark.slow
 def test_noise_is_met_and_told():
     mesh, clean = opened(NAMES[0], 2000, 1e-3), opened(NAMES[0], 2000)
     assert mesh.quality.verdict in ("smooth", "noisy")
@@ -170,6 +171,7 @@ def test_second_opening_takes_the_fit_from_the_cache(tmp_path):
         np.testing.assert_array_equal(again.level(at), body.level(at))
 
 
+@pytest.mark.slow
 def test_the_cache_does_not_need_what_reads_meshes(tmp_path):
     BALL.export(tmp_path / "ball.ply")
     made = sc.Mesh(tmp_path / "ball.ply", "m", cache=tmp_path / "fits")
@@ -332,6 +334,7 @@ def test_a_coarse_mesh_is_judged_by_its_fit():
         sc.Mesh(trimesh.creation.icosphere(1), cache=False)
 
 
+@pytest.mark.slow
 def test_vertices_are_fitted_as_well_as_their_spline_can():
     """What smooths F far from the body, where its distance has kinks, must not bend it on the body."""
     sides = (1.3, 1.0, 0.9)

@@ -91,6 +91,7 @@ def test_what_is_no_expression_is_refused_when_unpickled():
         pickle.loads(written)
 
 
+@pytest.mark.slow
 def test_a_process_that_is_started_anew_computes_the_same():
     body = made("with an edge")
     with multiprocessing.get_context("spawn").Pool(1) as pool:

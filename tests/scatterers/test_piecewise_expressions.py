@@ -193,6 +193,7 @@ def test_only_joints_leave_charts():
         _ = body_of("cone").atlas.charts
 
 
+@pytest.mark.slow
 def test_pieces_that_join_smoothly_are_one_smooth_body():
     body = sc.Implicit("x**2 + y**2 + z**2 - 1 + where(z < 0, 0, z**4)")
     assert type(body) is sc.Implicit and not isinstance(body, PiecewiseSurface)

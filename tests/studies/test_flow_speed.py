@@ -2,11 +2,14 @@
 
 import math
 
+import pytest
+
 from studies.cost import flow_speed
 
 ELLIPSOID = ("ellipsoid",)
 
 
+@pytest.mark.slow
 def test_long_leaps_compare_equal_errors():
     (row,) = flow_speed.long_leaps(ELLIPSOID, count=64, samples=100)
     assert row["body"] == "ellipsoid"

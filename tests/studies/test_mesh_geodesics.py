@@ -5,6 +5,7 @@ import pytest
 from studies.accuracy import fitted_bodies
 
 
+@pytest.mark.slow
 def test_the_fitted_body_is_a_hundred_times_more_exact():
     (row,) = fitted_bodies.geodesics(("ellipsoid",), (2000,))
     assert row["fitted 95 %"] < 1e-5

@@ -58,6 +58,7 @@ def test_errors_of_near_and_surface_fields_are_covered_on_the_sphere(boundary, k
     assert found["off"] < (5 if boundary == "pec" else 3) and found["on"] < (15 if boundary == "pec" else 5)
 
 
+@pytest.mark.slow
 def test_couplings_on_the_sphere():
     row = sphere_row(30.0)
     assert row["worst"] < 0.6 and row["covered"] > 95

@@ -1,6 +1,7 @@
 """The tables of sweeps say what they claim: references beside costs, errors within what was asked; never how fast."""
 
 import numpy as np
+import pytest
 from tolerances import FRACTION, LINE_LENGTH
 
 from studies.cost import sweep_speed
@@ -17,6 +18,7 @@ def test_lines_agree_with_their_reference():
     assert max(panels[share] for share in sweep_speed.STATUSES) < 10 * FRACTION
 
 
+@pytest.mark.slow
 def test_fans_carry_their_errors():
     rows = list(sweep_speed.fans(("ellipsoid",), count=8, checked=4))
     assert [row["flow"] for row in rows] == ["map", "map", "order 8", "order 8"]

@@ -70,6 +70,7 @@ def test_results_do_not_depend_on_tasks_or_order(asked):
         assert whole[name].values[order].tobytes() == mixed[name].values.tobytes(), name
 
 
+@pytest.mark.slow
 def test_a_cut_through_a_singular_direction_says_what_it_is():
     body = sc.Torus(1.0, 0.4)
     directions = arc(-3, 3, 0.1, height=0.0)[:, [2, 0, 1]]

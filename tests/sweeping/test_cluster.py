@@ -73,6 +73,7 @@ def test_poison_costs_its_incidence_alone(two, tmp_path, monkeypatch):
     assert np.array_equal(store.dataset().creeping, fake.creeping_of(40))
 
 
+@pytest.mark.slow
 def test_a_killed_worker_loses_nothing(two, tmp_path):
     plan = fake.plan(36, 3)
     store = SweepStore.create(tmp_path / "s.zarr", plan)
@@ -133,6 +134,7 @@ def test_no_scheduler_there(tmp_path, monkeypatch):
         fill(plan, store, client="tcp://127.0.0.1:9")
 
 
+@pytest.mark.slow
 def test_the_cluster_is_for_this_user_of_this_machine(two):
     import distributed
     import psutil

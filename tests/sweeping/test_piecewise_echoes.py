@@ -49,6 +49,7 @@ def test_cone_sphere_from_its_nose():
     assert abs(abs(base) - a / 2) <= error[1] < 0.1 * a / 2
 
 
+@pytest.mark.slow
 def test_echoes_of_joints_are_by_currents():
     """Soft, from a side: within a percent of fundamental solutions, where rays and optics err by several."""
     exact = stored.read("capsule_echoes")

@@ -124,6 +124,7 @@ def test_rays_of_a_sweep_are_as_long_as_the_lowest_wavenumber_asks():
     assert seen.unresolved.values.ravel().tolist() == [True, False]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "make", [sc.Sphere, lambda: sc.Implicit("max(x**2 + y**2 + z**2 - 1, x**2 + y**2 + (z - 1)**2 - 1)")]
 )

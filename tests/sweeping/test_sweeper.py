@@ -36,6 +36,7 @@ def test_a_sweep_is_far_field_one_by_one_to_the_last_bit(quantity, body):
         np.testing.assert_array_equal(found[name], plain[name], err_msg=name)
 
 
+@pytest.mark.slow
 def test_a_body_with_numpy_methods_only_sweeps(rng):
     exact = sc.Ellipsoid(1.2, 0.8, 0.6)
     names = ("level", "gradient", "hessian", "bounds", "parameters")

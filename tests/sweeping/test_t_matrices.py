@@ -61,6 +61,7 @@ def test_what_cannot_be_is_refused_before_the_first():
             cr.t_matrices(sc.Sphere(), wavenumbers=bad, boundary="soft")
 
 
+@pytest.mark.slow
 def test_interrupted_it_goes_on_to_the_same_bits(tmp_path, monkeypatch):
     monkeypatch.setattr(solved_waves, "COLUMNS", 8)
     body, told, asked = sc.Ellipsoid(0.5, 0.6, 1.0), [], ASKED | {"order": 2}

@@ -43,6 +43,7 @@ def twisted():
     return cr.launch(cr.DirectFlow(body, rtol=1e-8), cr.shadow_line(body, (0.8, -0.3, 0.5)), wavenumber=K, n_rays=48)
 
 
+@pytest.mark.slow
 def test_ground_behind_rays_that_have_detached_has_its_current(twisted, rng, monkeypatch):
     # the march is asked here, not lit ground
     monkeypatch.setattr(effort, "SECONDS", 0.0)

@@ -123,6 +123,7 @@ def test_bad_polarisations(ball, polarisation, message):
         cr.conductor_current(ball, [(0, 0, 1)], wavenumber=10.0, polarisation=polarisation)
 
 
+@pytest.mark.slow
 def test_where_rays_end_the_status_says_so(monkeypatch):
     # which is no matter of lit ground
     monkeypatch.setattr(effort, "SECONDS", 0.0)

@@ -50,6 +50,7 @@ def test_sphere(k, limit, rng):
     assert np.mean(off <= currents.error(r)) > 0.95
 
 
+@pytest.mark.slow
 def test_triaxial(rng):
     # isolated rays are off by 12 to 19 % of the largest value here, and say nothing
     k, r, d = 8.0, directions(rng, 200), directions(rng, 1)

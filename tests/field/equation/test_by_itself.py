@@ -95,6 +95,7 @@ def test_a_disc_and_a_needle_have_fields():
         assert found.nodes < 4000 and found.currents().extinction < 3e-3 and found.steps < 30
 
 
+@pytest.mark.slow
 def test_what_it_refuses(ellipsoid, monkeypatch):
     with pytest.raises(cr.InvalidInputError, match="method 'equation' has no order 1"):
         cr.far_field(ellipsoid, [(0, 0, 1)], wavenumber=K, method="equation", order=1)

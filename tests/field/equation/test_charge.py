@@ -86,6 +86,7 @@ def test_units_scale(flat):
     assert ON_BODY * currents.extinction <= currents.error_around(x).max()
 
 
+@pytest.mark.slow
 def test_a_solution_has_the_fields_of_a_fan(flat):
     # that of the fan, solved once
     solution = asked_solution(flat.body, D, 4.0, "pec").solution

@@ -49,6 +49,7 @@ def test_a_cube_of_irregular_triangles_is_a_cube(times, kind):
     assert np.mean(true < far.error) > 0.8 and np.median(far.error / true) < 12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "rule",
     [*RULES, *COARSE_RULES],
@@ -157,6 +158,7 @@ def test_echoes_and_sweeps_of_facets_are_the_solution(tmp_path):
     np.testing.assert_array_equal(kept.total, again.total)
 
 
+@pytest.mark.slow
 def test_a_body_of_many_pieces_is_solved_on_its_own_triangles():
     # an open seam of one piece with itself has no mesh of squares
     body = sc.Mesh(cube(2), cache=False)

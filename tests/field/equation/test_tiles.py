@@ -67,6 +67,7 @@ def test_tiles_on_both_faces_of_an_edge_are_parted_at_the_same_places():
     assert_allclose(angles[0], angles[1], atol=1e-4)
 
 
+@pytest.mark.slow
 def test_single_and_double_layers_of_a_harmonic_function():
     # on the surface of a body u/2 = S du/dn - D u, u harmonic inside: 2 S du/dn - 2 D u = u
     tiles = tiles_for(patches_of(sc.Cone(1.0, 2.0)), 4.0)

@@ -89,6 +89,7 @@ child.main(name, int(seed), range(int(start), int(stop), int(step)), Path(folder
 """
 
 
+@pytest.mark.slow
 def test_crashes_hangs_and_wrong_errors_are_findings(tmp_path, monkeypatch):
     here, root = Path(__file__).parent, Path(__file__).parents[3]
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(here), str(root), *sys.path]))

@@ -97,6 +97,7 @@ def test_points_inside_a_hard_sphere():
     assert np.all(np.abs(found.values[:, 0] - exact) < 0.01 * np.abs(exact))
 
 
+@pytest.mark.slow
 def test_slots_by_dipoles_inside_a_sphere():
     k, angles = 8.0, np.radians([30.0, 60.0, 110.0, 150.0])
     points, there = places(angles)

@@ -66,6 +66,7 @@ def test_conducting_sphere_against_mie(directions):
     assert np.max(found.inside) < 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("boundary", ["soft", "hard"])
 def test_an_ogive_against_rings_of_sources(boundary, directions):
     found = scatter_by_modes(OGIVE, 3.0, [0.0, 0.9], boundary)

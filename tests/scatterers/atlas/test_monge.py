@@ -123,6 +123,7 @@ def test_check_passes(name):
     assert report.genus == {"ellipsoid": 0, "torus": 1, "genus 2": 2}[name]
 
 
+@pytest.mark.slow
 def test_phase_map_in_space(rng):
     body = covered("ellipsoid")
     flow = cr.build_phase_map(body, horizon=1 / 8, grid=(16, 24), degree=5, method="direct", cache=False)

@@ -223,6 +223,7 @@ def test_only_bodies_without_edges_and_tips_have_charts():
             _ = BODIES[name].atlas.charts
 
 
+@pytest.mark.slow
 def test_a_splined_spheroid_converges_to_the_exact_one(rng):
     spheroid = sc.Ellipsoid(1.0, 1.0, 2.0)
     # the poles too, and a place next to one

@@ -107,6 +107,7 @@ def curvatures(body, x):
     return unit(body.gradient(x)), 0.5 * np.trace(shape_operator(body, x), axis1=1, axis2=2)
 
 
+@pytest.mark.slow
 def test_a_rod_is_a_cylinder_between_two_planes():
     body = opened("rod of few triangles")
     assert [(c.kind, c.closed) for c in body.creases] == [("edge", True)] * 2
@@ -122,6 +123,7 @@ def test_a_rod_is_a_cylinder_between_two_planes():
     np.testing.assert_allclose(mean, 0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_torus_cut_in_half_is_known_up_to_its_rims():
     body = opened("half torus")
     rims = [crease for crease in body.creases if crease.kind == "edge"]

@@ -207,6 +207,7 @@ def test_parts_that_keep_away_from_the_points_change_their_sign():
     assert not equations._stray(np.where(near, -values, values), np.abs(values)).any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("depth", "symmetric"), [(0.0, True), (0.003, False)])
 def test_a_body_is_made_its_own_mirror_image_where_it_is_one(depth, symmetric):
     """A dent at one end of an ellipsoid: not so along that axis, though it is along both others."""

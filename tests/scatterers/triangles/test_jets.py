@@ -61,6 +61,7 @@ def test_normals_and_curvatures_are_exact_to_their_order(name):
     assert np.all(jets.principal[:, 0] >= jets.principal[:, 1])
 
 
+@pytest.mark.slow
 def test_orders():
     # residuals of degree d are of order e^(d + 1)
     fine, coarse = (osculating_jets(*even(ELLIPSOID, n)).residuals for n in (8002, 2002))
@@ -76,6 +77,7 @@ def test_lower_degrees_differ_from_the_highest_by_their_errors():
     assert np.all(np.diff(jets.residuals, axis=1) < 0)
 
 
+@pytest.mark.slow
 def test_sheets_near_each_other_do_not_mix():
     # a disc a twentieth as thick as wide: the other side is nearer than most neighbours
     body = sc.Ellipsoid(1.0, 1.0, 0.05)

@@ -139,6 +139,7 @@ def test_a_subdivided_mesh_passes_by_its_vertices_and_errs_about_as_stated():
     assert error < 1.4 * body.fit.normal_curvature_error
 
 
+@pytest.mark.slow
 def test_a_noisy_mesh_is_no_better_for_a_narrower_grid(rng):
     """On the narrowest both fits would follow the noise, and agree."""
     mesh = ball(times=3)
@@ -166,6 +167,7 @@ def test_bodies_of_pieces_are_not_subdivided(mesh):
     assert sc.examined_mesh(mesh, subdivide="auto")[0].repairs == ()
 
 
+@pytest.mark.slow
 def test_what_a_subdivision_makes_is_bounded():
     with pytest.raises(ValueError, match="subdivide = 3 makes 655488 vertices of 10242, more than 300000; subdivide"):
         sc.examined_mesh(ball(times=5), subdivide=3)
