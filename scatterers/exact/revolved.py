@@ -27,7 +27,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import pairwise
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -211,23 +211,17 @@ class Revolved(Levelled, Body):
             phi = ring_angles(360, self._stretch)
             points = self._placed(np.stack([r * np.cos(phi), r * np.sin(phi), np.full(360, w)], axis=-1))
             points = np.concatenate([points, points[:1]])
-            kind: Literal["edge", "joint", "seam"] = "edge" if abs(turn) > SMALLEST else "joint"
-            if kind == "joint" and self._goes_on(k):
-                kind = "seam"
-            found.append(Crease(kind, (k, k + 1), points, self._angle(k, points) if kind == "edge" else 0.0))
+            if abs(turn) > SMALLEST:
+                a, b = (piece.gradient(points) for piece in self.pieces[k : k + 2])
+                angles = np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), np.sum(a * b, axis=-1))
+                found.append(Crease("edge", (k, k + 1), points, float(np.max(angles))))
+                continue
+            # a seam where piece k + 1 has all of piece k, too
+            w, r = self._profile[k].point(np.array([0.0, 0.5])).T
+            off = self.pieces[k + 1].level(self._placed(np.stack([r, 0 * r, w], axis=-1)))
+            same = np.max(np.abs(off)) < 1e-12 * np.max(np.abs(self.bounds))
+            found.append(Crease("seam" if same else "joint", (k, k + 1), points, 0.0))
         return found
-
-    def _goes_on(self, k: int) -> bool:
-        """Whether piece k + 1 has all of piece k, too."""
-        w, r = self._profile[k].point(np.array([0.0, 0.5])).T
-        off = self.pieces[k + 1].level(self._placed(np.stack([r, 0 * r, w], axis=-1)))
-        return bool(np.max(np.abs(off)) < 1e-12 * np.max(np.abs(self.bounds)))
-
-    def _angle(self, k: int, points: FloatArray) -> float:
-        """Largest angle between the normals of pieces k and k + 1 at points (n, 3)."""
-        a, b = (piece.gradient(points) for piece in self.pieces[k : k + 2])
-        across = np.linalg.norm(np.cross(a, b), axis=-1)
-        return float(np.max(np.arctan2(across, np.sum(a * b, axis=-1))))
 
     def tiles(self, edge: float) -> tuple[FloatArray, FloatArray, IntArray]:
         """The body as triangles with sides of about ``edge``, L, at most, in rings about the axis.
