@@ -24,10 +24,10 @@ Sources: [C76, sec. 3-3]; Derivations, B14.
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import pairwise
-from typing import NamedTuple
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -284,12 +284,19 @@ class Revolved(Levelled, Body):
     @cached
     def atlas(self) -> CubeSphereAtlas | NoCharts:
         """Six charts of a body that has neither edges nor tips and is seen whole from the middle of its box."""
+        from scatterers.kernels.charts import one_cell
+
         sharp = [crease for crease in self.creases if crease.kind in SHARP]
         if sharp or self._axes != (0, 1, 2) or self._stretch != 1:
             return no_charts(sharp)
         half, middle = 0.5 * np.ptp(self.bounds, axis=0), self.bounds.mean(axis=0)
         wider = np.stack([self.bounds[0] - 0.1 * half, self.bounds[1] + 0.1 * half])
-        space = RevolvedSpace(wider, lambda of_map: self._packed(self._profile, of_map))
+        # a grid of one cell, the map and the body; see `scatterers.charts.star.SpaceLevel`
+        space: Any = SimpleNamespace(
+            box=wider,
+            flat=lambda of_map: self._packed(self._profile, one_cell(wider, of_map)),
+            sources={"level": evaluate, "forward": _forward()},
+        )
         sphere_map = RadialMap(space, middle, half, Spine.none())
         points = self.tiles(0.05 * float(np.linalg.norm(half)))[0].reshape(-1, 3)
         if hidden := int(np.sum(~(sphere_map.facing(points) > 0))):
@@ -352,32 +359,6 @@ def strip(lower: int, upper: int) -> tuple[IntArray, IntArray]:
     )
     ring = np.where(up[:, None], [0, 1, 1], [0, 0, 1])
     return ring.astype(np.int64), number
-
-
-@dataclass(frozen=True, eq=False)
-class RevolvedSpace:
-    """F of a body of revolution in a box; satisfies `scatterers.charts.star.SpaceLevel`.
-
-    Attributes
-    ----------
-    box : (2, 3), L
-    packed : callable
-        All parameters from those of the map.
-    """
-
-    box: FloatArray
-    packed: Callable[[FloatArray], FloatArray]
-
-    def flat(self, of_map: FloatArray) -> FloatArray:
-        """Parameters of the compiled functions: a grid of one cell, those of a map, those of the body."""
-        from scatterers.kernels.charts import one_cell
-
-        return self.packed(one_cell(self.box, of_map))
-
-    @property
-    def sources(self) -> dict[str, Callable[..., None]]:
-        """Plain Python of the compiled functions."""
-        return {"level": evaluate, "forward": _forward()}
 
 
 @cache
