@@ -139,13 +139,12 @@ class Implicit(LevelBody):
         if len(apart) <= 8:
             apart = np.array([polished(self.compiled, place, size) for place in apart]).reshape(-1, 3)
         tips = len(apart) <= 8 and all(is_tip(self.compiled, place, size) for place in apart)
-        if not tips:
-            if len(sharp):
-                worst = tuple(sharp[np.argmax(bends)].round(6).tolist())
-                raise ValueError(
-                    f"F = 0 is not smooth: its curvature has no bound near {worst} "
-                    f"({len(sharp)} searches); an edge or a pole of F there: round it off in F"
-                )
+        if not tips and len(sharp):
+            worst = tuple(sharp[np.argmax(bends)].round(6).tolist())
+            raise ValueError(
+                f"F = 0 is not smooth: its curvature has no bound near {worst} ({len(sharp)} searches); an edge or a "
+                "pole of F there: round it off in F"
+            )
         found = distinct(np.concatenate([flat, apart]), np.arange(len(flat) + len(apart), 0.0, -1.0), size)
         if strict and len(found):
             raise ValueError(

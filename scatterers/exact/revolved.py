@@ -24,10 +24,10 @@ Sources: [C76, sec. 3-3]; Derivations, B14.
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import pairwise
-from typing import Literal, NamedTuple
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -211,23 +211,17 @@ class Revolved(Levelled, Body):
             phi = ring_angles(360, self._stretch)
             points = self._placed(np.stack([r * np.cos(phi), r * np.sin(phi), np.full(360, w)], axis=-1))
             points = np.concatenate([points, points[:1]])
-            kind: Literal["edge", "joint", "seam"] = "edge" if abs(turn) > SMALLEST else "joint"
-            if kind == "joint" and self._goes_on(k):
-                kind = "seam"
-            found.append(Crease(kind, (k, k + 1), points, self._angle(k, points) if kind == "edge" else 0.0))
+            if abs(turn) > SMALLEST:
+                a, b = (piece.gradient(points) for piece in self.pieces[k : k + 2])
+                angles = np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), np.sum(a * b, axis=-1))
+                found.append(Crease("edge", (k, k + 1), points, float(np.max(angles))))
+                continue
+            # a seam where piece k + 1 has all of piece k, too
+            w, r = self._profile[k].point(np.array([0.0, 0.5])).T
+            off = self.pieces[k + 1].level(self._placed(np.stack([r, 0 * r, w], axis=-1)))
+            same = np.max(np.abs(off)) < 1e-12 * np.max(np.abs(self.bounds))
+            found.append(Crease("seam" if same else "joint", (k, k + 1), points, 0.0))
         return found
-
-    def _goes_on(self, k: int) -> bool:
-        """Whether piece k + 1 has all of piece k, too."""
-        w, r = self._profile[k].point(np.array([0.0, 0.5])).T
-        off = self.pieces[k + 1].level(self._placed(np.stack([r, 0 * r, w], axis=-1)))
-        return bool(np.max(np.abs(off)) < 1e-12 * np.max(np.abs(self.bounds)))
-
-    def _angle(self, k: int, points: FloatArray) -> float:
-        """Largest angle between the normals of pieces k and k + 1 at points (n, 3)."""
-        a, b = (piece.gradient(points) for piece in self.pieces[k : k + 2])
-        across = np.linalg.norm(np.cross(a, b), axis=-1)
-        return float(np.max(np.arctan2(across, np.sum(a * b, axis=-1))))
 
     def tiles(self, edge: float) -> tuple[FloatArray, FloatArray, IntArray]:
         """The body as triangles with sides of about ``edge``, L, at most, in rings about the axis.
@@ -290,12 +284,19 @@ class Revolved(Levelled, Body):
     @cached
     def atlas(self) -> CubeSphereAtlas | NoCharts:
         """Six charts of a body that has neither edges nor tips and is seen whole from the middle of its box."""
+        from scatterers.kernels.charts import one_cell
+
         sharp = [crease for crease in self.creases if crease.kind in SHARP]
         if sharp or self._axes != (0, 1, 2) or self._stretch != 1:
             return no_charts(sharp)
         half, middle = 0.5 * np.ptp(self.bounds, axis=0), self.bounds.mean(axis=0)
         wider = np.stack([self.bounds[0] - 0.1 * half, self.bounds[1] + 0.1 * half])
-        space = RevolvedSpace(wider, lambda of_map: self._packed(self._profile, of_map))
+        # a grid of one cell, the map and the body; see `scatterers.charts.star.SpaceLevel`
+        space: Any = SimpleNamespace(
+            box=wider,
+            flat=lambda of_map: self._packed(self._profile, one_cell(wider, of_map)),
+            sources={"level": evaluate, "forward": _forward()},
+        )
         sphere_map = RadialMap(space, middle, half, Spine.none())
         points = self.tiles(0.05 * float(np.linalg.norm(half)))[0].reshape(-1, 3)
         if hidden := int(np.sum(~(sphere_map.facing(points) > 0))):
@@ -358,32 +359,6 @@ def strip(lower: int, upper: int) -> tuple[IntArray, IntArray]:
     )
     ring = np.where(up[:, None], [0, 1, 1], [0, 0, 1])
     return ring.astype(np.int64), number
-
-
-@dataclass(frozen=True, eq=False)
-class RevolvedSpace:
-    """F of a body of revolution in a box; satisfies `scatterers.charts.star.SpaceLevel`.
-
-    Attributes
-    ----------
-    box : (2, 3), L
-    packed : callable
-        All parameters from those of the map.
-    """
-
-    box: FloatArray
-    packed: Callable[[FloatArray], FloatArray]
-
-    def flat(self, of_map: FloatArray) -> FloatArray:
-        """Parameters of the compiled functions: a grid of one cell, those of a map, those of the body."""
-        from scatterers.kernels.charts import one_cell
-
-        return self.packed(one_cell(self.box, of_map))
-
-    @property
-    def sources(self) -> dict[str, Callable[..., None]]:
-        """Plain Python of the compiled functions."""
-        return {"level": evaluate, "forward": _forward()}
 
 
 @cache

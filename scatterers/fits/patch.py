@@ -117,25 +117,14 @@ class Closeness(NamedTuple):
 
 
 def polynomial_patch(points: FloatArray, normals: FloatArray, close: Closeness) -> Patch | None:
-    """Plane or quadric through points (n, 3), L, if there is one."""
-    found = polynomial_through(points, normals, close.most)
-    if found is not None and found[2] > close.rms:
-        return None
-    return None if found is None else Patch(found[0], found[0], *found[1:], 0.0, 0.0)
-
-
-def polynomial_through(
-    points: FloatArray, normals: FloatArray, tolerance: float
-) -> tuple[TensorSpline, str, float] | None:
-    """Plane or quadric through points within a tolerance, L, as a spline; its kind and rms distance.
+    """Plane or quadric through points (n, 3), L, with such normals, if there is one.
 
     Examples
     --------
     >>> import numpy as np
     >>> turn = np.linspace(0, 6, 50)
     >>> normals = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
-    >>> _, kind, _ = polynomial_through(normals + np.outer(turn % 1, [0, 0, 1]), normals, 1e-6)
-    >>> kind
+    >>> polynomial_patch(normals + np.outer(turn % 1, [0, 0, 1]), normals, Closeness(1e-6)).kind
     'quadric'
     """
     middle = points.mean(axis=0)
@@ -170,8 +159,9 @@ def polynomial_through(
         slope = steep / np.median(steep)
         # normals of triangles lean by so many radians from those of a quadric through their corners
         least = np.select([slope > SLIGHT, slope > TIP], [np.cos(0.35), 0.0], -1.0)
-        if np.all(off <= max(tolerance, curved)) and np.all(lean >= least) and np.sum(slope <= TIP) <= 1:
-            return _as_spline(q / np.median(steep), powers, middle, half), kind, float(np.sqrt(np.mean(off**2)))
+        if np.all(off <= max(close.most, curved)) and np.all(lean >= least) and np.sum(slope <= TIP) <= 1:
+            spline, rms = _as_spline(q / np.median(steep), powers, middle, half), float(np.sqrt(np.mean(off**2)))
+            return Patch(spline, spline, kind, rms, 0.0, 0.0) if rms <= close.rms else None
     return None
 
 

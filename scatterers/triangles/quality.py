@@ -31,8 +31,8 @@ import numpy as np
 from creeping._typing import BoolArray, FloatArray, IntArray
 from scatterers.triangles.jets import Jets, angle_weighted_normals
 from scatterers.triangles.parts import areas, capped, compact, listed, parts_of, silent, taken_apart, united
-from scatterers.triangles.regions import FEWEST, SHARP
-from scatterers.triangles.topology import cleaned, edges_of, flat_normals, oriented
+from scatterers.triangles.regions import FEWEST, SHARP, turns_of
+from scatterers.triangles.topology import cleaned, oriented
 
 BAD = 0.03
 RESIDUAL_PER_NOISE = 0.95, 0.81
@@ -154,15 +154,11 @@ def assess(vertices: FloatArray, triangles: IntArray, jets: Jets) -> MeshQuality
     corners = vertices[triangles]
     length = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=-1)
     edge = float(length.mean())
-    # edges (k, 2) and the angles between their triangles (k,), degrees; small ones are left out
-    edges = edges_of(triangles)
-    normal, area = flat_normals(vertices[triangles])
-    left, right = edges.sides.T // 3
-    across = np.linalg.norm(np.cross(normal[left], normal[right]), axis=1)
-    angle = np.arctan2(across, np.sum(normal[left] * normal[right], axis=1))
+    ends, sides, turn = turns_of(vertices, triangles)
+    area = areas(vertices, triangles)
     # normals of slivers tell nothing
-    solid = np.minimum(area[left], area[right]) > 0.05 * np.median(area)
-    ends, angles = edges.ends[solid], np.degrees(angle[solid])
+    solid = np.min(area[sides], axis=1) > 0.05 * np.median(area)
+    ends, angles = ends[solid], np.abs(turn[solid])
     curvature = np.abs(jets.principal).max(axis=1)
     doubt = _doubt(jets)
     astray = np.linalg.norm(jets.normals - angle_weighted_normals(vertices, triangles), axis=1)

@@ -93,15 +93,15 @@ def regions_of(
     >>> found.count, [crease.closed for crease in found.creases(rod.vertices, found.number)]
     (3, [True, True])
     """
-    ends, sides, turn = _turns(vertices, triangles)
+    ends, sides, turn = turns_of(vertices, triangles)
     crease = _chained(ends, turn, _piecewise(sides, turn, len(triangles)) if sharp is None else sharp, len(vertices))
     level = np.zeros_like(crease) if level is None else level & ~crease
     bounds = crease | level
     return Regions(_connected(len(triangles), sides[~bounds]), ends, sides, turn, bounds, level)
 
 
-def _turns(vertices: FloatArray, triangles: IntArray) -> tuple[IntArray, IntArray, FloatArray]:
-    """Ends (e, 2), triangles (e, 2) and the turn (e,) of the edges of a closed mesh."""
+def turns_of(vertices: FloatArray, triangles: IntArray) -> tuple[IntArray, IntArray, FloatArray]:
+    """Ends (e, 2), triangles (e, 2) and the turn (e,), degrees, of the edges of a closed mesh."""
     edges = edges_of(triangles)
     # both corners of each edge, that of the triangle that runs forward along it first
     order = np.lexsort((~edges.forward, edges.number)).reshape(-1, 2)

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 import scatterers as sc
-from scatterers.fits.patch import curved, divided, polynomial_through
+from scatterers.fits.patch import Closeness, curved, divided, polynomial_patch
 from scatterers.kernels.compiled import SYMMETRIC, evaluated
 
 RNG = np.random.default_rng(11)
@@ -34,9 +34,9 @@ SURFACES = {
 def test_planes_and_quadrics_are_found(name, turned):
     points, normals, curvature = SURFACES[name]
     normals = turned * normals / np.linalg.norm(normals, axis=1, keepdims=True)
-    spline, kind, misfit = polynomial_through(points, normals, 1e-9)
-    assert kind == ("plane" if name == "plane" else "quadric") and misfit < 1e-12
-    value, gradient, packed = evaluated(spline.compiled, points)
+    patch = polynomial_patch(points, normals, Closeness(1e-9))
+    assert patch.kind == ("plane" if name == "plane" else "quadric") and patch.misfit < 1e-12
+    value, gradient, packed = evaluated(patch.fine.compiled, points)
     np.testing.assert_allclose(value, 0, atol=1e-11)
     slope = np.linalg.norm(gradient, axis=1, keepdims=True)
     np.testing.assert_allclose(gradient / slope, normals, atol=1e-10)
@@ -54,13 +54,13 @@ def test_other_surfaces_are_no_quadrics():
     normals = points * np.cos(s[:, 1:2]) + np.outer(np.sin(s[:, 1]), [0, 0, 1])
     points = points + 0.5 * normals
     np.testing.assert_allclose(body.level(points), 0, atol=1e-12)
-    assert polynomial_through(points, normals, 1e-6) is None
+    close = Closeness(1e-6)
+    assert polynomial_patch(points, normals, close) is None
     # two balls are none either, nor is a plane with normals along it
-    assert (
-        polynomial_through(np.concatenate([ROUND, ROUND + np.array([4, 0, 1])]), np.tile(ROUND, (2, 1)), 1e-6) is None
-    )
+    balls = np.concatenate([ROUND, ROUND + np.array([4, 0, 1])])
+    assert polynomial_patch(balls, np.tile(ROUND, (2, 1)), close) is None
     flat = np.stack([U, V, NONE], axis=1)
-    assert polynomial_through(flat, np.tile([1.0, 0, 0], (200, 1)), 1e-6) is None
+    assert polynomial_patch(flat, np.tile([1.0, 0, 0], (200, 1)), close) is None
 
 
 @pytest.mark.parametrize("edge", [0.3, 0.1])
