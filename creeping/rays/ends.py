@@ -230,7 +230,7 @@ class Starts(NamedTuple):
         return Starts(self.arcs, arc, position, points[order], state[order], spacing, arclength), order
 
     def launch_points(self, line: ShadowLine) -> LaunchPoints:
-        """As launch points of one incidence."""
+        """`LaunchPoints` of one incidence."""
         curve = np.array([self.arcs[k].curve for k in self.arc], dtype=np.int64)
         closed = np.array([self.arcs[k].closed for k in self.arc], dtype=float)
         arc = self.arc.astype(float)

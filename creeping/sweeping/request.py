@@ -310,7 +310,7 @@ def with_lattice(request: SweepRequest, incidences: FloatArray) -> SweepRequest:
 
 
 def solved_alone(body: Surface, request: SweepRequest, incidences: int) -> bool:
-    """Whether the fields that are asked for need no rays: those of a body whose equation alone serves."""
+    """Whether the fields that are asked for need no rays: the integral equation gives them all."""
     if request.quantity == "rays" or request.accuracy is not None:
         return False
     checked_across(body, min(request.wavenumbers), max(request.wavenumbers))

@@ -233,7 +233,7 @@ def _beyond(samples: Samples, half: float) -> bool:
 
 
 def tightened(space: ExpressionSpace, samples: Samples) -> FloatArray:
-    """Box (2, 3), L, around the nodes inside, sampled anew until it fits."""
+    """Box (2, 3), L, just around the nodes with F < 0, sampled again four times."""
     for _ in range(4):
         low, high = samples.inside
         # wider than the body by a part of its half widths

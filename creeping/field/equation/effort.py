@@ -66,7 +66,7 @@ class Plan(NamedTuple):
 
 
 class Load(NamedTuple):
-    """Of the equation on tiles: nodes; seconds of near tiles, of all made once and of a column's product; bytes.
+    """Load of the equation on tiles: nodes; seconds of near tiles, of setup and of a column's product; bytes.
 
     ``parts`` of the body are images of each other (`creeping.field.equation.mirrors`).
     """

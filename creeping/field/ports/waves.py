@@ -74,7 +74,7 @@ class Path(NamedTuple):
 
 
 def path_of(rays: PortRays, wavenumber: float) -> Path:
-    """Of all geodesics (m,)."""
+    """`Path` of all geodesics (m,)."""
     ends = rays.curvature, rays.torsion, rays.bend
     return Path(wavenumber, rays.arclength, *ends, rays.integrals, rays.turning)
 

@@ -285,7 +285,7 @@ def known_t_matrix(body: Surface, wavenumber: float, boundary: BoundaryLike) -> 
 
 
 def kept_t_matrix(body: Surface, wavenumber: float, boundary: BoundaryLike, store: Path | None = None) -> TMatrix:
-    """The T-matrix of a body, made once while there is room for it."""
+    """The T-matrix of a body, cached while there is room for it."""
     known: dict[Any, TMatrix] = memo(body, "T-matrices", dict)
     key = wavenumber, boundary
     if key not in known:

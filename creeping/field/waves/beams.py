@@ -271,7 +271,7 @@ def _beams_of(
 
 
 def variation(fan: RayFan, shed: ShedRays, y: ComplexArray, across: ComplexArray, wavenumber: float) -> FloatArray:
-    """Eta (m,) of waves y whose derivative in sigma is ``across`` (m,)."""
+    """eta (m,) of waves y whose derivative in sigma is ``across`` (m,)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         eta = (
             np.abs(across / (y * shed.rays.width)) ** 2 * beam_length(fan.body) / (2 * wavenumber * WIDTH * FACTORS[0])
