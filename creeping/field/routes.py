@@ -268,7 +268,7 @@ def poor(columns: list[PointValues]) -> BoolArray:
 
 
 def affordable(fan: RayFan, places: int, wavenumber: float, *, distant: bool = False) -> bool:
-    """Whether currents cost little enough for so many points, or directions if ``distant``."""
+    """Whether currents cost little enough for ``places`` points, or directions if ``distant``."""
     nodes = expected_nodes(fan, wavenumber)
     if nodes > TRUST.nodes:
         return False
@@ -302,7 +302,7 @@ def marches(fan: RayFan, boundary: Boundary, order: int, count: int, wavenumber:
 
 
 def affords(problem: Problem, places: int) -> bool:
-    """Whether currents cost little enough for the field at so many points."""
+    """Whether currents cost little enough for the field at ``places`` points."""
     each = TRUST.vector * problem.columns if problem.vector else 1.0
     return affordable(problem.fan, int(np.ceil(each * places)), problem.wavenumber)
 
@@ -314,7 +314,7 @@ def currents_of(problem: Problem) -> SurfaceCurrents:
 
 
 def currents_near(problem: Problem, places: int) -> SurfaceCurrents | None:
-    """Currents for the field at so many points; None if they cost too much or there is no mesh for them.
+    """Currents for the field at ``places`` points; None if they cost too much or there is no mesh for them.
 
     Raises
     ------
@@ -379,7 +379,7 @@ def by_equation_alone(
     method: str,
     order: int = 2,
 ) -> bool:
-    """Whether far fields of so many incidences are those of the equation, and rays are needed for none of them.
+    """Whether the equation gives the far fields of ``incidences`` incidences, without any rays.
 
     At wavenumbers (k,), 1/L, at each of which the equation is solved by itself, of a body without expansions or one
     whose expansions reach to none of them.
@@ -395,7 +395,7 @@ def by_equation_alone(
 
 
 def far_currents(problem: Problem, directions: int) -> SurfaceCurrents | None:
-    """Currents that a far field in so many directions is taken from; None where rays are used.
+    """Currents for a far field in ``directions`` directions; None where rays are used.
 
     Edges diffract, and currents go across joints: of a body of pieces the equation alone knows how, expansions next.
 

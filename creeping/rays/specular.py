@@ -227,7 +227,7 @@ def _step(body: Surface, points: FloatArray, wanted: FloatArray) -> tuple[FloatA
 
 
 def smooth_parts(body: Any) -> tuple[tuple[int, ...], ...]:
-    """Numbers of the pieces that hang together by joints and seams, part by part."""
+    """Numbers of the pieces of each part connected by joints and seams."""
     part = list(range(len(body.pieces)))
     for crease in body.creases:
         if crease.kind in SMOOTH:

@@ -180,7 +180,7 @@ def _bend(compiled: Compiled, points: FloatArray, reach: float) -> tuple[FloatAr
 
 
 def samples_of(space: ExpressionSpace, box: FloatArray, nodes: int) -> Samples:
-    """F on a grid of nearly cubic cells with so many nodes along the longest side."""
+    """F on a grid of nearly cubic cells with ``nodes`` along the longest side."""
     side = box[1] - box[0]
     counts = np.clip(np.ceil(side / side.max() * (nodes - 1)).astype(int) + 1, 17, nodes)
     axes = [np.linspace(box[0, k], box[1, k], counts[k]) for k in range(3)]

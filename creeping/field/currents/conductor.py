@@ -221,7 +221,7 @@ def ray_scalars(rays: RayPoints, wavenumber: float, order: int) -> tuple[Complex
 
 
 def spread_of(rays: RayPoints, wavenumber: float) -> FloatArray:
-    """1/J (...), held where rays cross: J is known to be no narrower than the boundary layer there."""
+    """1/J (...), bounded where rays cross: J is known to be no narrower than the boundary layer there."""
     m = scales(rays, wavenumber)[1]
     return np.asarray(rays.spreading / (rays.spreading**2 + 1 / m**4))
 

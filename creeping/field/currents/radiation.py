@@ -70,13 +70,13 @@ def phase_sums(points: FloatArray, weights: ComplexArray, directions: FloatArray
 
 
 def grid_cells(widths: FloatArray, wavenumber: float) -> float:
-    """Cells of the transform's grid for nodes in a box of such widths (3,), L, and all directions."""
+    """Cells of the transform's grid for nodes in a box of ``widths`` (3,), L, and all directions."""
     # two for each that the bandwidth asks for, and twenty more along a side
     return float(np.prod(2 * wavenumber * widths / np.pi + 20))
 
 
 def transformed(nodes: int, directions: int, cells: float) -> bool:
-    """Whether directions are worth a transform of so many cells, 0.6 GB of them at most."""
+    """Whether a transform of ``cells``, at most 0.6 GB, is faster than direct sums."""
     # what a node and a cell cost, in terms of one direction seen from one node
     return cells <= 40_000_000 and 1500.0 * nodes + 60.0 * cells < nodes * directions
 

@@ -147,7 +147,7 @@ def kind_columns(kind: Boundary) -> int:
 
 
 def near_seconds(nodes: float, pairs: float, p: int, kind: Boundary, *, flat: bool) -> float:
-    """Seconds of integrals over tiles of p x p nodes near to nodes and to the points beneath them, in so many pairs."""
+    """Seconds of integrals over tiles of p x p nodes near to nodes and to the points beneath them, in ``pairs``."""
     vector = (NEAR_FLAT if flat else NEAR_CURVED) if kind.kind == "conductor" else 1.0
     node, pair = (first + more * p**2 for first, more in (PER_NODE, PER_PAIR))
     return 2 * (nodes * node + pairs * pair) * vector / thread_count()

@@ -250,7 +250,7 @@ def march_alone(body: Surface, boundary: Boundary) -> bool:
 
 
 def marchable(fan: RayFan, boundary: Boundary, order: int, fewest: int = 8) -> bool:
-    """Whether the waves of a fan can be marched, with at least so many rays on each of its strips."""
+    """Whether the waves of a fan can be marched, with at least ``fewest`` rays on each strip."""
     strips = fan_strips(fan)
     return (
         order == 2

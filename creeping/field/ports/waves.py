@@ -96,7 +96,7 @@ def second_order(
     early: Callable[[IntArray, ComplexArray], ComplexArray],
     late: Callable[[IntArray, int], ComplexArray],
 ) -> ComplexArray:
-    """What second order adds (m,) to ``plain``: early under the integral at small ξ, late by so many modes beyond.
+    """What second order adds (m,) to ``plain``: early under the integral at small ξ, late by modes beyond.
 
     ``early(rows, plain)`` and ``late(rows, count)`` are asked for the rows that each serves, and blended.
     """

@@ -194,7 +194,7 @@ def _counts(strip: Strip, length: float, wavenumber: float) -> tuple[int, int]:
 
 
 def seconds(fan: RayFan, strips: tuple[Strip, ...], wavenumber: float, count: int) -> float:
-    """About how long beams take at so many points."""
+    """Time of beams at ``count`` points, s, about."""
     sizes = [_counts(strip, fan.length, wavenumber) for strip in strips]
     # 20 ns for a block of a beam's steps at one point, 3 us to make a step
     summing = 2e-8 * count * sum(beams * (1 + steps / 16) for beams, steps in sizes)

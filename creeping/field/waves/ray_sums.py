@@ -303,7 +303,7 @@ def gradient_coupling(rays: RayPoints, wavenumber: float) -> ComplexArray:
 
 
 def held_coupling(coupling: ComplexArray) -> ComplexArray:
-    """The coupling c held below 1 in size, c/(1 + |c|⁴)^(1/4).
+    """The coupling c limited to size 1, c/(1 + |c|⁴)^(1/4).
 
     As the next order of a wave it cannot be larger than what it comes from.
     """
