@@ -153,7 +153,7 @@ class Starts(NamedTuple):
 
     @classmethod
     def of(cls, line: ShadowLine, n_rays: int | None, launch_from: str) -> "Starts":
-        """The launch points of a line: ``n_rays``, or for None at its points; one at least on each arc."""
+        """The launch points of a line: ``n_rays``, or for None at its spacing; one at least on each arc."""
         arcs = line.arcs(launch_from)
         if n_rays is None:
             shares = [(a.end - a.start) / line.curves[a.curve].length * len(line.curves[a.curve].points) for a in arcs]
