@@ -301,10 +301,9 @@ class SphereMapped:
 
 @dataclass(frozen=True)
 class NoCharts:
-    """Stands for the atlas of what has none.
+    """Atlas of a body without charts.
 
-    The error comes with the question for charts, not for the atlas: whether a body has the members of a protocol is
-    found out by asking for all of them.
+    Reading ``charts`` raises the error, reading the atlas does not: a runtime check of a protocol reads all members.
 
     Attributes
     ----------
@@ -315,7 +314,7 @@ class NoCharts:
 
     @property
     def charts(self) -> Any:
-        """None.
+        """Always an error.
 
         Raises
         ------
@@ -334,7 +333,7 @@ class NoCharts:
 
 
 def no_charts(sharp: Sequence[Crease]) -> NoCharts:
-    """No charts because of edges and tips."""
+    """Atlas of a body that edges, tips or pieces leave without charts."""
     found = f"{len(sharp)} edges and tips, first {sharp[0]!r}" if sharp else "several pieces"
     return NoCharts(f"the body has {found}: no smooth charts cover it; take its tiles")
 

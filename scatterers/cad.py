@@ -77,7 +77,7 @@ class Cad(FittedBody):
     """
 
     tessellated = True
-    """Its triangles stand for curved faces."""
+    """Triangles approximate curved faces."""
 
     def __init__(
         self,

@@ -26,7 +26,7 @@ class Facets(Shown):
     ----------
     source : path, or object with ``vertices`` and ``faces``
         STL, OBJ, PLY, OFF, GLB, 3MF, MSH, BDF or MESH file, or e.g. a trimesh.Trimesh; each of its parts is closed. Or
-        a STEP, IGES or BREP file, whose triangles have their corners on it.
+        a STEP, IGES or BREP file, meshed with corners on its faces.
     units : {"m", "mm", "cm", "um", "in", "ft", "km"}, optional
         Unit of the coordinates; required for files that do not state it. Objects in memory are in metres by default.
     part : str or int, optional
@@ -48,7 +48,7 @@ class Facets(Shown):
     repairs : tuple of str
         Changes made to the mesh.
     tessellated : bool
-        Whether the triangles approximate curved faces, as from a CAD file; errors then include the difference.
+        Whether the triangles approximate curved faces, as from a CAD file; the error of a field then includes it.
 
     Raises
     ------

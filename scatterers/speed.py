@@ -66,15 +66,15 @@ class ExpressionSpeed:
         return Compiled(self._functions.block, "level", np.zeros(1))
 
     def value(self, points: FloatArray) -> FloatArray:
-        """c, L over time: points (..., 3), L, to (...)."""
+        """Speed c (...), L/time, at points (..., 3), L."""
         return evaluated(self.compiled, points)[0]
 
     def gradient(self, points: FloatArray) -> FloatArray:
-        """grad c, 1/time: points (..., 3), L, to (..., 3)."""
+        """Gradient of c (..., 3), 1/time, at points (..., 3), L."""
         return evaluated(self.compiled, points)[1]
 
     def hessian(self, points: FloatArray) -> FloatArray:
-        """Hessian of c, 1/(L time): points (..., 3), L, to (..., 3, 3)."""
+        """Hessian of c (..., 3, 3), 1/(L time), at points (..., 3), L."""
         return evaluated(self.compiled, points)[2][..., SYMMETRIC]
 
 
@@ -140,7 +140,7 @@ class Coating:
         return self.real if self.imaginary == "0" else f"{self.real} + 1j*({self.imaginary})"
 
     def value(self, points: FloatArray) -> ComplexArray:
-        """Eta (...) at points (..., 3), L."""
+        """Admittance (...) at points (..., 3), L."""
         x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
         real, imaginary = (np.broadcast_to(function(x, y, z)[0], x.shape) for function in self._functions)
         return np.asarray(real + 1j * imaginary)

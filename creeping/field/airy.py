@@ -42,7 +42,7 @@ TURN = np.exp(2j * np.pi / 3)
 W1 = 2 * np.sqrt(np.pi) * np.exp(1j * np.pi / 6)
 
 SERIES = 1.5
-"""ξ up to which the series in powers of ξ^(3/2) serves, forty terms of it: good to 1e-13 there."""
+"""ξ up to which the series in powers of ξ^(3/2) is used, forty terms of it: good to 1e-13 there."""
 DEEP = 4.0
 """ξ from which on five modes are summed, before it sixteen: to 1e-10."""
 _BRANCHES: dict[tuple[complex, int], tuple[list[complex], list[ComplexArray]]] = {}

@@ -162,7 +162,7 @@ def _expanded(fan: RayFan, lit: LitNodes, k: float, kinds: tuple[Boundary, ...])
 def cached_currents(
     fan: RayFan, wavenumber: float, boundary: BoundaryLike, *, solve: bool | None = None
 ) -> SurfaceCurrents:
-    """Currents of the whole body, made once for each of the last wavenumbers and boundaries.
+    """Currents of the whole body, cached for the last wavenumbers and boundaries.
 
     Raises
     ------

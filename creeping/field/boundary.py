@@ -49,7 +49,7 @@ class Coating:
     given: Any
 
     def value(self, points: FloatArray) -> ComplexArray:
-        """Eta (n,) at points (n, 3), L.
+        """Admittance (n,) at points (n, 3), L.
 
         Raises
         ------

@@ -128,7 +128,7 @@ def far_in_parts(
     method: str = "auto",
     keep: Keeping = not_kept,
 ) -> FarField:
-    """The same, what is ready of it given to ``keep``: ``rays-`` of some directions after the other, or sums."""
+    """As `far_field`; ``keep`` stores the finished parts: ``rays-`` of some directions after the other, or sums."""
     one_of(fan, "fan", RayFan, "creeping.launch")
     checked_plain(fan.body)
     scalar_boundaries(boundary)

@@ -1,4 +1,4 @@
-"""The total field nearer to the body than currents serve: between the field on it and that of currents above.
+"""The total field nearer to the body than currents give it: between the field on it and that of currents above.
 
 Along the normal at x, h above the body, t = kh and c = -n.d, at least 0.15, below which the four terms are powers of t
 to rounding, each component is
@@ -47,7 +47,7 @@ Tops = tuple[list[ComplexArray], list[FloatArray]]
 
 
 def heights_of(problem: Problem) -> tuple[float, ...]:
-    """Heights above the body, in wavelengths, at which currents are asked; from the least one on they serve.
+    """Heights above the body, in wavelengths, at which currents are asked; they are valid from the least one on.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def heights_of(problem: Problem) -> tuple[float, ...]:
 
 
 def layer_fields(problem: Problem, currents: SurfaceCurrents, points: FloatArray) -> tuple[IntArray, list[PointValues]]:
-    """Rows of the points (n, 3), L, that the layer serves, and the field there of each polarisation.
+    """Rows of the points (n, 3), L, in the layer, and the field there of each polarisation.
 
     Without the field on the body there is none above it.
     """
@@ -94,7 +94,7 @@ def layer_fields(problem: Problem, currents: SurfaceCurrents, points: FloatArray
 def _scalars(
     nodes: BodyNodes, surface: PointValues, tops: Tops, w: FloatArray, k: float, kind: Boundary
 ) -> tuple[ComplexArray, FloatArray]:
-    """U and its error (n,) from that on the body and at two heights."""
+    """u and its error (n,) from that on the body and at two heights."""
     on, off, nothing = surface.values, surface.error, np.zeros_like(surface.values)
     if kind.kind == "soft":
         known, its = [nothing, on / k], [np.abs(nothing), off / k]

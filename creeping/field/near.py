@@ -6,7 +6,7 @@
 Currents (`creeping.field.currents`) know no caustics and no shadow boundary, but they err by a share of the incident
 wave, and must be a quarter of a wavelength away; nearer, the field is between theirs and that on the body
 (`creeping.field.layer`), unless they solve the equation (`creeping.field.equation.currents`). Rays err by a share of
-what they bring, which in the deep shadow is far less. So rays serve in the shadow where nothing is the matter with them
+what they bring, which in the deep shadow is far less. So rays are used in the shadow where their status is OK
 and their error is the smaller one (`creeping.field.routes`). On the body E = (n.E) n and H = J x n of a conductor.
 
 Also here: e and H of the creeping rays whose tangents pass through points off a conductor.
@@ -259,7 +259,7 @@ class _Points:
         return off & (self.dark | (not currents))
 
     def left_over(self, columns: list[PointValues]) -> BoolArray:
-        """Points that nothing serves."""
+        """Points without a field yet."""
         none = np.full(len(self.points), not march_alone(self.problem.body, self.problem.kind))
         return np.asarray(none & ~self.on & (columns[0].method == "none"))
 
@@ -273,7 +273,7 @@ class _Points:
         return [(at, columns)]
 
     def for_currents(self, columns: list[PointValues]) -> BoolArray:
-        """Points that rays do not serve well; all if what solves the equation is there."""
+        """Points (n,) with a poor field by rays; all if the equation is solved."""
         return ~self.on & (poor(columns) | (self.solved is not None))
 
     def by_currents(self, at: IntArray) -> Served:

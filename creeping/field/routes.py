@@ -131,7 +131,7 @@ class Problem:
 
     @property
     def columns(self) -> int:
-        """P, or 1."""
+        """Polarisations p, or 1."""
         return 1 if self.mix is None else self.mix.shape[1]
 
     @cached_property
@@ -147,7 +147,7 @@ class Problem:
 
     @property
     def has_expansions(self) -> bool:
-        """As the function of this name."""
+        """See the function `has_expansions`."""
         return has_expansions(self.body, self.boundary)
 
     @property
@@ -171,7 +171,7 @@ class Problem:
         return currents.polarised(self.mix)
 
     def facts(self) -> dict[str, Any]:
-        """What its results say of it."""
+        """Facts that all its results state."""
         return {
             "wavenumber": self.wavenumber,
             "boundary": boundary_name(self.boundary),
@@ -202,7 +202,7 @@ class Trust:
     lit : float
         Share of a body's nodes that are lit or in the penumbra.
     beams : float
-        Seconds that beams may take where marched waves merge; beyond, creeping modes serve.
+        Seconds that beams may take where marched waves merge; beyond, creeping modes are used.
     level_nodes, level_directions : int
         Nodes of the currents that rays are compared with, some tenths of a second, and directions of the comparison.
     levels : (float, float)
@@ -239,9 +239,9 @@ class Route(NamedTuple):
     Attributes
     ----------
     asked : callable
-        Which points (n,) it may serve, given the field that there is of each polarisation.
+        Points (n,) it may take, given the field that there is of each polarisation.
     serve : callable
-        Gives the field at points, by their numbers, as far as it serves them; nothing if it costs too much.
+        Gives the field at points, by their numbers, where it is valid; nothing if it costs too much.
     must : bool
         Whether its values stand whatever they state.
     """
@@ -262,13 +262,13 @@ def answered(columns: list[PointValues], routes: Sequence[Route]) -> list[PointV
 
 
 def poor(columns: list[PointValues]) -> BoolArray:
-    """Which points (n,) are not served well enough by rays."""
+    """Points (n,) where rays are not OK or err too much."""
     fine = TRUST.fine if len(columns[0].wave.shape) == 1 else TRUST.fine_vector
     return np.asarray(np.any([(one.status != FieldStatus.OK) | (one.error > fine) for one in columns], axis=0))
 
 
 def affordable(fan: RayFan, places: int, wavenumber: float, *, distant: bool = False) -> bool:
-    """Whether currents cost little enough for so many points, or directions if ``distant``."""
+    """Whether currents cost little enough for ``places`` points, or directions if ``distant``."""
     nodes = expected_nodes(fan, wavenumber)
     if nodes > TRUST.nodes:
         return False
@@ -302,7 +302,7 @@ def marches(fan: RayFan, boundary: Boundary, order: int, count: int, wavenumber:
 
 
 def affords(problem: Problem, places: int) -> bool:
-    """Whether currents cost little enough for the field at so many points."""
+    """Whether currents cost little enough for the field at ``places`` points."""
     each = TRUST.vector * problem.columns if problem.vector else 1.0
     return affordable(problem.fan, int(np.ceil(each * places)), problem.wavenumber)
 
@@ -314,7 +314,7 @@ def currents_of(problem: Problem) -> SurfaceCurrents:
 
 
 def currents_near(problem: Problem, places: int) -> SurfaceCurrents | None:
-    """Currents for the field at so many points; None if they cost too much or there is no mesh for them.
+    """Currents for the field at ``places`` points; None if they cost too much or there is no mesh for them.
 
     Raises
     ------
@@ -339,16 +339,16 @@ def solved_by_itself(problem: Problem) -> SurfaceCurrents | None:
 
 
 def currents_behind(problem: Problem) -> SurfaceCurrents | None:
-    """The same, or currents that tell what comes to places of the body from elsewhere on it, if they are affordable.
+    """As `solved_by_itself`, or affordable currents for what comes to the body from elsewhere on it.
 
-    Of a body whose expansions stand alone there are none of these.
+    None for a body whose expansions stand alone.
     """
     found = solved_by_itself(problem)
     return found if found or stands_alone(problem) else _judging(problem)
 
 
 def left_behind(problem: Problem, currents: SurfaceCurrents | None) -> FloatArray:
-    """What these leave inside of each incident wave (p,): 0 of expansions that stand alone, NaN if it is not known."""
+    """Residual field of currents inside, per incident wave (p,): 0 if expansions stand alone, NaN if not known."""
     if currents is not None:
         return np.asarray(np.max(currents.left_of_each, axis=0))
     return np.full(problem.columns, 0.0 if stands_alone(problem) else np.nan)
@@ -379,7 +379,7 @@ def by_equation_alone(
     method: str,
     order: int = 2,
 ) -> bool:
-    """Whether far fields of so many incidences are those of the equation, and rays are needed for none of them.
+    """Whether the equation gives the far fields of ``incidences`` incidences, without any rays.
 
     At wavenumbers (k,), 1/L, at each of which the equation is solved by itself, of a body without expansions or one
     whose expansions reach to none of them.
@@ -395,14 +395,14 @@ def by_equation_alone(
 
 
 def far_currents(problem: Problem, directions: int) -> SurfaceCurrents | None:
-    """Currents that a far field in so many directions is taken from; None where rays serve.
+    """Currents for a far field in ``directions`` directions; None where rays are used.
 
     Edges diffract, and currents go across joints: of a body of pieces the equation alone knows how, expansions next.
 
     Raises
     ------
     InvalidInputError, SurfaceError
-        As `creeping.surface_currents`, where currents are asked for or nothing else serves.
+        As `creeping.surface_currents`, where currents are asked for or nothing else is valid.
     """
     fan, k, boundary, method = problem.fan, problem.wavenumber, problem.boundary, problem.method
     piecewise = is_piecewise(problem.body)

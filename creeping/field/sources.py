@@ -4,8 +4,8 @@
 
 A source of e^{ikR}/(4 pi R) at x_s sends to r what x_s receives of the plane wave from there: the total field, lit,
 reflected and creeping, with its error, as `creeping.field.near` and, on the body, `creeping.field.on_body` have it.
-With no body F = e^{-ik r.x_s}. Each direction is an incidence of its own, which serves all sources. Where the integral
-equation takes no longer for all of them together than rays would, it serves.
+With no body F = e^{-ik r.x_s}. Each direction is an incidence of its own, shared by all sources. Where the integral
+equation takes no longer for all of them together than rays would, it is used.
 
 Sources: [CK13, sec. 3.3]; Derivations, F27.
 """
@@ -137,13 +137,13 @@ def source_pattern(
     boundary : "soft", "hard" or ImpedanceBoundary
         A source on a soft body radiates nothing.
     n_rays : int
-        Number of rays for each direction, where rays serve.
+        Number of rays for each direction, where rays are used.
 
     Returns
     -------
     SourcePattern
         With the ears as sources, the values are head-related transfer functions. By rays each direction takes about
-        0.2 s at ka = 30 and 0.6 s at ka = 100; the integral equation, which serves where it takes no longer, 0.1 s.
+        0.2 s at ka = 30 and 0.6 s at ka = 100; the integral equation, used where it takes no longer, 0.1 s.
 
     Raises
     ------

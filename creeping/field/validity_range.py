@@ -89,15 +89,15 @@ def validity(fan: RayFan, *, wavenumber: float) -> Validity:
 def validities(
     body: Surface, launch: LaunchPoints, until: float, wavenumbers: tuple[float, ...]
 ) -> tuple[FloatArray, FloatArray]:
-    """Both numbers for n incidences and k wavenumbers, at all launch points and along SOME rays of each: twice (n, k).
+    """Least k rho and largest |kappa_t| rho/m^2 for n incidences and k wavenumbers: (n, k) each.
 
-    Equal to `validity` of a fan of those rays; where curvature changes within their spacing, as at the tip of a slender
-    body, or falls to 0 beside a concave region, a fan of more rays finds more extreme ones.
+    From all launch points and along SOME rays of each incidence. Where curvature changes within their spacing, as at
+    the tip of a slender body, or falls to 0 beside a concave region, a fan of more rays finds more extreme values.
 
     Parameters
     ----------
     body : Surface
-        Plain.
+        Without a speed.
     launch : LaunchPoints
         Of n incidences.
     until : float, L
@@ -156,7 +156,7 @@ def launch_validity(body: Surface, launch: LaunchPoints) -> tuple[FloatArray, Fl
 
 
 def body_validity(body: Surface, *, wavenumber: float) -> Validity:
-    """The worse of both numbers over twelve evenly spread incidences; NaN if none launches a ray.
+    """Least k rho and largest |kappa_t| rho/m^2 over twelve incidences; NaN if none launches a ray.
 
     Examples
     --------
@@ -180,7 +180,7 @@ def is_reached(body: Surface, wavenumber: float) -> bool:
 
 
 def validity_words(found: Validity, *, measured: bool = False) -> str:
-    """What both numbers say of a field, for a reader; ``measured`` if its error is, which then counts for more.
+    """Text on the range of the expansion at these numbers; ``measured`` if the field's error was measured.
 
     Examples
     --------
@@ -201,7 +201,7 @@ def validity_words(found: Validity, *, measured: bool = False) -> str:
 
 
 def validity_numbers(found: Validity) -> str:
-    """Both numbers as a reader sees them."""
+    """Text of k rho and kappa_t rho/m^2."""
     return f"k rho >= {found.least_k_rho:.3g}, kappa_t rho/m^2 <= {found.largest_transverse:.2g}"
 
 

@@ -115,7 +115,7 @@ def joined(arrays: Iterable[Any], width: int | None = None) -> Any:
 
 
 def number_of(parts: Sequence[Any]) -> Any:
-    """For each of the points of curves the number of its curve."""
+    """Curve number of each point of all curves, from 0: (points,)."""
     return np.repeat(np.arange(len(parts)), [len(one.points) for one in parts])
 
 
@@ -174,7 +174,7 @@ def _wave_words(field: Any, unit: str) -> str:
 
 
 def _cut_columns(cut: Any) -> list[Column]:
-    """Of a `FieldCut`: a row for each point outside the body."""
+    """Columns of a `FieldCut`: a row for each point outside the body."""
     field: Any = cut.field
     unit, outside = field.length_unit, cut.outside
     place = f"from ({', '.join(f'{v!r}' for v in cut.point.tolist())})"

@@ -42,7 +42,7 @@ STEEP, NEWTON = 0.2, 20
 
 
 def patches_of(body: Surface) -> Patches:
-    """Squares that cover a body, made once.
+    """Squares that cover a body, cached.
 
     Raises
     ------

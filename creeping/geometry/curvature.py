@@ -126,7 +126,7 @@ class ParabolicPoints:
 
 
 def parabolic_points(body: Surface, mesh: Triangulation | None = None) -> ParabolicPoints:
-    """Parabolic points of a body, found once and kept with it; none on a convex one.
+    """Parabolic points of a body, cached; none on a convex one.
 
     Examples
     --------

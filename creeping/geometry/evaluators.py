@@ -66,7 +66,7 @@ def is_compiled(body: Surface) -> bool:
 
 
 def _offered(body: Surface, role: str, make: Callable[[], Any], source: Any) -> Any:
-    """The compiled function that the source offers, or the callback of this body, made once."""
+    """The compiled function that the source offers, or the callback of this body, cached."""
     compiled = getattr(source, "compiled", None)
     if compiled is not None:
         return compiled

@@ -116,7 +116,7 @@ def checked_smooth(body: Any, what: str, remedy: str) -> None:
 
 
 def tiles_of(body: Any, share: float) -> Tiles:
-    """Triangles with sides of at most a share of the body's size, made once."""
+    """Triangles with sides of at most a share of the body's size, cached."""
 
     def made() -> Tiles:
         corners, normals, pieces = body.tiles(share * size(body))
@@ -178,7 +178,7 @@ def _drawn_parts(body: Any, cells: int) -> tuple[Triangulation, FloatArray]:
 
 
 def pieces_of(body: Any) -> tuple[Any, ...]:
-    """Pieces of a body with creases, as bodies (`Piece`) without charts, made once."""
+    """Pieces of a body with creases, as bodies (`Piece`) without charts, cached."""
 
     def made() -> tuple[Piece, ...]:
         tiles = tiles_of(body, SAMPLE)
@@ -191,7 +191,7 @@ def pieces_of(body: Any) -> tuple[Any, ...]:
 
 
 def pieces_across(body: Any) -> FloatArray:
-    """Diagonal of the box about each piece (n,), L; found once."""
+    """Diagonal of the box about each piece (n,), L; cached."""
 
     def made() -> FloatArray:
         tiles = tiles_of(body, SAMPLE)

@@ -90,7 +90,7 @@ class Compiled(Protocol):
 
     @property
     def parameters(self) -> FloatArray:
-        """Its parameters (k,), in the units of its body."""
+        """Parameters (k,) of it, in the units of its body."""
         ...
 
 

@@ -235,7 +235,7 @@ def with_errors(
 
 
 def sampled_errors(sample: Callable[[int], FloatArray], count: int, most: int, *, column: int = -1) -> FloatArray:
-    """Errors (n, m) of so many random rays, doubled up to ``most`` times that while the rms of a column scatters."""
+    """Errors (n, m) of ``count`` random rays, doubled up to ``most`` times that while the rms of a column scatters."""
     errors = sample(count)
     limit = count * most
     while 2 * len(errors) <= limit and upper_bound(errors[:, column]) > 1.2 * np.sqrt(np.mean(errors[:, column] ** 2)):

@@ -142,7 +142,7 @@ class PhaseMap(Drawn):
 
     @cached_property
     def digest(self) -> str:
-        """Of the contents of the tables; taken once, they are not to be changed."""
+        """Digest of the tables, cached: the tables are not to be changed."""
         tables = hashlib.blake2b(digest_size=16)
         for leap in self.leaps:
             for array in (leap.state, leap.centre, leap.jacobi, leap.matrix, leap.curvature, leap.flagged):

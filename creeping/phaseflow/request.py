@@ -258,7 +258,7 @@ def choose_flow(
 
 
 def _stored(spec: MapSpec, tolerance: float, cache: bool | str | Path) -> MapSpec | None:
-    """The spec of a map in the cache that serves: the one asked for, or one for the usual number of rays."""
+    """The spec of a map in the cache that can be used: the one asked for, or one for the usual number of rays."""
     if tolerance < 1e-9:
         return None
     for one in (spec, replace(spec, n_rays=RAYS)):

@@ -73,7 +73,7 @@ class Candidate:
     target: float
 
     def seconds(self, rays: float, length: float) -> float:
-        """Nominal seconds of the build and of so many rays."""
+        """Nominal seconds of the build and of ``rays`` rays."""
         return self.build + rays * length * self.leap
 
 
@@ -396,7 +396,7 @@ def map_seconds(flow: PhaseMap, length: float, *, carry_jacobi: bool) -> float:
 
 
 def leap_seconds(degree: int, nbytes: float, *, carry_jacobi: bool = False, flat: bool = False) -> float:
-    """Nominal seconds of one leap of a ray anywhere on the body, for a table of (x, p) of so many bytes.
+    """Nominal seconds of one leap of a ray anywhere on the body, for a table of (x, p) of ``nbytes``.
 
     20 (cubic) and 40 ns in the nearest cache, more by the logarithm of the table beyond 1 MB, where a stencil's cache
     lines come from farther away. A table without azimuth has 4 or 6 rows where another has 16 or 36.

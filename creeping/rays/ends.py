@@ -153,7 +153,7 @@ class Starts(NamedTuple):
 
     @classmethod
     def of(cls, line: ShadowLine, n_rays: int | None, launch_from: str) -> "Starts":
-        """The launch points of a line: so many, or at the spacing of its points; one at least on each arc."""
+        """The launch points of a line: ``n_rays``, or for None at its spacing; one at least on each arc."""
         arcs = line.arcs(launch_from)
         if n_rays is None:
             shares = [(a.end - a.start) / line.curves[a.curve].length * len(line.curves[a.curve].points) for a in arcs]
@@ -230,7 +230,7 @@ class Starts(NamedTuple):
         return Starts(self.arcs, arc, position, points[order], state[order], spacing, arclength), order
 
     def launch_points(self, line: ShadowLine) -> LaunchPoints:
-        """As launch points of one incidence."""
+        """`LaunchPoints` of one incidence."""
         curve = np.array([self.arcs[k].curve for k in self.arc], dtype=np.int64)
         closed = np.array([self.arcs[k].closed for k in self.arc], dtype=float)
         arc = self.arc.astype(float)

@@ -59,7 +59,7 @@ class RayPoints(Rows):
 
     @property
     def points(self) -> FloatArray:
-        """X (..., 3), L."""
+        """x (..., 3), L."""
         return self.lanes[..., 0:3]
 
     @property
@@ -134,7 +134,7 @@ class RayPoints(Rows):
 
     @property
     def first_normal(self) -> FloatArray:
-        """N at the launch point (..., 3)."""
+        """n at the launch point (..., 3)."""
         return self.starts[..., 6:9]
 
     @property

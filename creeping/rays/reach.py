@@ -133,7 +133,7 @@ def early_length(body: Surface, wavenumber: float) -> float:
 
 
 def trial_points(body: Surface) -> LaunchPoints:
-    """Launch points of INCIDENCES evenly spread incidences, found once."""
+    """Launch points of INCIDENCES evenly spread incidences, cached."""
     return memo(body, "trial points", lambda: shadow_lines(body, fibonacci_directions(INCIDENCES), TRIALS).launch)
 
 

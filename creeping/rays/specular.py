@@ -9,8 +9,8 @@ Also here: specular points of a body with creases: those of each smooth piece th
 clear.
 
 A reflected ray forms over the Fresnel zone of its specular point, √(π/(k|κ| cos θᵢ)) along a principal direction of
-curvature κ. Nearer than that to an edge or tip, and half as near to a joint, the point alone does not tell what the
-ground gives; nor does it on a facet or a cylinder, where the zone is without end.
+curvature κ. Nearer than that to an edge or tip, and half as near to a joint, the point alone does not give the
+reflected field; nor does it on a facet or a cylinder, where the zone is without end.
 
 Sources: Derivations, F13.
 """
@@ -124,7 +124,7 @@ def specular_points(
 def shape_term(
     body: Surface, points: FloatArray, normals: FloatArray, frame: FloatArray, principal: FloatArray
 ) -> FloatArray:
-    """Λ (n,), 1/L, of the next order of a stationary phase: ∫ e^{-2iKh} du dv has the factor 1 - iΛ/K.
+    """Λ (n,), 1/L, of the next order of stationary phase: ∫ e^{-2iKh} du dv has the factor 1 - iΛ/K, K = k cos θᵢ.
 
     h(u, v) is the height of the body over its tangent plane, u and v along the principal axes. With ψ = -2h and its
     third and fourth derivatives ψ_uuu, ...,
@@ -227,7 +227,7 @@ def _step(body: Surface, points: FloatArray, wanted: FloatArray) -> tuple[FloatA
 
 
 def smooth_parts(body: Any) -> tuple[tuple[int, ...], ...]:
-    """Numbers of the pieces that hang together by joints and seams, part by part."""
+    """Numbers of the pieces of each part connected by joints and seams."""
     part = list(range(len(body.pieces)))
     for crease in body.creases:
         if crease.kind in SMOOTH:

@@ -95,7 +95,7 @@ class Strip:
         return low - half, float(self.positions[-1]) + half
 
     def first_normals(self, sigma: FloatArray) -> FloatArray:
-        """N at the launch points σ (n,): (n, 3)."""
+        """n at the launch points σ (n,): (n, 3)."""
         n = self._splines[1](self.wrap(sigma))[:, 6:9]
         return np.asarray(n / np.linalg.norm(n, axis=1, keepdims=True))
 
@@ -104,7 +104,7 @@ class Strip:
         return np.clip(np.searchsorted(self.positions, self.wrap(sigma), side="right") - 1, 0, len(self.positions) - 1)
 
     def coarse_normals(self, body: Surface) -> FloatArray:
-        """n at the coarse steps of the rays, found once: (rays, coarse steps, 3)."""
+        """n at the coarse steps of the rays, cached: (rays, coarse steps, 3)."""
         return memo(self, "coarse normals", lambda: normal(body, self.rays.points[:, self.coarse_steps]))
 
     @property

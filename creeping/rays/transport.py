@@ -138,7 +138,7 @@ def spread(
 
 
 def zeros_passed(spreading: FloatArray) -> IntArray:
-    """Sign changes of J up to each step; a step that lands on a zero counts once it is passed."""
+    """Number of sign changes of J up to each step (rays, steps); a zero on a step counts from the next."""
     sign = np.sign(spreading)
     # the last step of each at which J was not 0
     last = np.maximum.accumulate(np.where(sign != 0, np.arange(sign.shape[1]), 0), axis=1)

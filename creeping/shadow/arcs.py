@@ -252,7 +252,7 @@ class Finished:
 
 
 def finished(body: Surface, curves: Curves, n_rays: int, *, every: bool = False) -> Finished:
-    """Arcs of lines, and so many launch points of each: on attached arcs, or with ``every`` on the whole of it."""
+    """Arcs of lines, and ``n_rays`` launch points of each line: on attached arcs, or with ``every`` on all."""
     breaks = breaks_of(curves, np.asarray(body.bounds, dtype=float))
     curve, ends = _between(curves, breaks.curve, breaks.place)
     state, agree = _states(body, curves, curve, ends, breaks.extreme)
@@ -374,7 +374,7 @@ def _launched(body: Surface, curves: Curves, arcs: Arcs, n_rays: int, every: boo
 
 
 def shared_out(lengths: FloatArray, wanted: int) -> IntArray:
-    """Rays of arcs in proportion to their lengths, one each at least, as long as there are so many.
+    """Rays of arcs in proportion to their lengths, ``wanted`` in all; at least one each if that suffices.
 
     Examples
     --------

@@ -40,7 +40,7 @@ class Arc(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LaunchPoints(Rows):
-    """Places for so many rays on the shadow lines of n incidences.
+    """Launch points of rays on the shadow lines of n incidences.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class LaunchPoints(Rows):
 
 
 def evenly_chosen(there: BoolArray, most: int) -> BoolArray:
-    """At most so many of the places of each row that hold a ray, evenly spread over them: (n, rays) -> (n, rays).
+    """At most ``most`` of the True places of each row, evenly spread over them: (n, rays) -> (n, rays).
 
     Examples
     --------

@@ -145,5 +145,5 @@ def spelled(fractions: dict[str, float]) -> str:
 
 
 def counted(number: int, noun: str) -> str:
-    """So many of something."""
+    """Text such as "3 rays"."""
     return f"{number} {noun}{'s' * (number != 1)}"

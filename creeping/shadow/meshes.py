@@ -138,7 +138,7 @@ def singular_segments(body: Surface, mesh: Triangulation) -> FloatArray:
 
 
 def prepared(body: Surface) -> LineMeshes:
-    """Meshes of a body, made once."""
+    """Meshes of a body for shadow lines, cached."""
     return memo(body, "line meshes", lambda: LineMeshes(body))
 
 

@@ -180,7 +180,7 @@ def _arcs(body: Any, piece: Any, direction: FloatArray, panels: PanelCurve) -> t
 
 
 def launched_from(curves: tuple[ShadowCurve, ...], arcs: list[Arc], direction: FloatArray, n_rays: int) -> LaunchPoints:
-    """So many launch points on arcs, as `shared_out` has them, evenly spaced: n is 1.
+    """``n_rays`` launch points, evenly spaced, `shared_out` over the arcs: n is 1.
 
     Half a spacing from the ends of an arc, where kappa_n, the illumination or the piece ends.
     """

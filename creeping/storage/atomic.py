@@ -105,7 +105,7 @@ def _mode(path: Path) -> int:
 
 
 def opened(path: str | os.PathLike[str], most: float = math.inf) -> io.BufferedReader:
-    """Open a regular file, or a link to one, of at most so many bytes; nothing is waited for.
+    """Open a regular file, or a link to one, of at most ``most`` bytes; nothing is waited for.
 
     Raises
     ------

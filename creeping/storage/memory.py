@@ -74,7 +74,7 @@ def within_budget(size: float, what: str, remedy: str, *, asked: float | None = 
 
 
 def blocks(count: int, each: float) -> list[slice]:
-    """Parts of so many rows of ``each`` bytes, as few as fit the budget.
+    """Parts of ``count`` rows of ``each`` bytes, as few as fit the budget.
 
     Examples
     --------

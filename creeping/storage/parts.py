@@ -22,7 +22,7 @@ Keeping = Callable[[str, Callable[[], Arrays]], Arrays]
 
 
 def not_kept(_: str, make: Callable[[], Arrays]) -> Arrays:
-    """Of results without a store."""
+    """Arrays without a store."""
     return make()
 
 

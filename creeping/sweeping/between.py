@@ -37,7 +37,7 @@ from creeping.sweeping.request import LINE, SHARES, VALID, SweepRequest
 from creeping.sweeping.sweeper import Arrays, FieldArrays, Passed, Sweeper
 
 NODES = np.arange(-2, 4)
-"""Of a stencil, from its cell's own on."""
+"""Nodes of a stencil, from that of its cell."""
 BASE = 2
 """Place of the cell's own node, x = 0, among them."""
 SAFE, NOISE = 2.0, 1e-5
@@ -117,7 +117,7 @@ def sheet_sums(
 def links(
     begin: IntArray, count: IntArray, label: IntArray, key: FloatArray, pairs: IntArray, step: float
 ) -> tuple[IntArray, IntArray]:
-    """What each sheet goes over into at the next node, and the inverse: (sheets,) each, -1 where there is none.
+    """Sheet that continues each one at the next node, and the inverse: (sheets,) each, -1 where there is none.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def _is_least(group: IntArray, value: FloatArray) -> BoolArray:
 
 
 def chains(start: IntArray, after: IntArray, before: IntArray) -> IntArray:
-    """Sheets (n, 6) at the nodes of the stencil around that of ``start`` (n,), -1 where one is lost; see `links`."""
+    """Sheets (n, 6) that continue ``start`` (n,) at the nodes of the stencil, -1 where none does; see `links`."""
     out = np.empty((len(start), len(NODES)), dtype=np.int64)
     out[:, BASE] = start
     for place in range(BASE + 1, len(NODES)):
@@ -302,7 +302,7 @@ class FieldsBetween:
         return out
 
     def _level(self, level: int, incidences: FloatArray, rows: IntArray, out: Arrays) -> BoolArray:
-        """Fill the rows (n,) of incidences (n, 3) that a level serves: which of them those are (n,)."""
+        """Fill the rows (n,) of incidences (n, 3) that a level interpolates: which of them those are (n,)."""
         nodes = self._nodes
         number, places = self._lattice.located(incidences, level)
         own, which = np.unique(number, return_inverse=True)

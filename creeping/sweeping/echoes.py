@@ -169,7 +169,7 @@ def bistatic(
 
 
 def seconds_of_currents(body: Surface, k: FloatArray, radar: Any, *, observers: int, boundary: BoundaryLike) -> float:
-    """About what an echo costs where currents serve all of its incidences, by the first of them; 0 of unknown cost.
+    """Cost of an echo by currents at all incidences, s, estimated from the first one; 0 if it is not known.
 
     ``radar``: azimuths and elevations (n,), degrees; ``observers`` directions belong to each.
     """

@@ -152,7 +152,7 @@ def orientation_averages(
 
 
 def averages_of(body: Surface, boundary: BoundaryLike, rows: list[tuple[float, Averages]]) -> xarray.Dataset:
-    """Dataset of `orientation_averages` of wavenumbers, 1/L, and averages."""
+    """Dataset of `orientation_averages`; a row is k, 1/L, and averages."""
     library, unit = require("xarray"), unit_of(body)
     means = "averaged over all orientations" + " and both polarisations" * (boundary_name(boundary) == "pec")
     words = {

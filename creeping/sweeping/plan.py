@@ -114,7 +114,7 @@ class SweepPlan:
 
     @property
     def digest(self) -> str:
-        """Of the key."""
+        """Digest of the key."""
         return content_digest(self.key)
 
 

@@ -251,7 +251,7 @@ class SweepRequest:
         return found
 
     def empty(self, count: int, *, filled: bool = True) -> dict[str, np.ndarray[Any, Any]]:
-        """Arrays of results for so many incidences, filled with what stands for nothing; FAILED. Or not filled."""
+        """Arrays of results for ``count`` incidences, if ``filled`` with no-data values and status FAILED."""
         shapes = {name: (count, *(self.sizes[d] for d in v.dims)) for name, v in self.variables.items()}
         if not filled:
             return {name: np.empty(shapes[name], dtype=v.dtype) for name, v in self.variables.items()}
@@ -310,7 +310,7 @@ def with_lattice(request: SweepRequest, incidences: FloatArray) -> SweepRequest:
 
 
 def solved_alone(body: Surface, request: SweepRequest, incidences: int) -> bool:
-    """Whether the fields that are asked for need no rays: those of a body whose equation alone serves."""
+    """Whether the fields that are asked for need no rays: the integral equation gives them all."""
     if request.quantity == "rays" or request.accuracy is not None:
         return False
     checked_across(body, min(request.wavenumbers), max(request.wavenumbers))

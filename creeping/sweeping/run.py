@@ -72,7 +72,7 @@ def sweep_directions(
     quantity : {"monostatic", "bistatic", "rays"}
         "monostatic": field back towards the source. "bistatic": field in the directions ``observation``. "rays": the
         rays themselves. All results include data of the shadow line: curves, length, shares; NaN where no rays are
-        launched, as by the T-matrix, or where the equation alone serves a body with edges.
+        launched, as by the T-matrix, or where only the equation is valid on a body with edges.
     observation : (m, 3), optional
         Directions of observation for "bistatic".
     boundary : {"soft", "hard", "pec"}, ImpedanceBoundary or a list of them

@@ -35,13 +35,13 @@ class Key(NamedTuple):
 
 
 def one_of(*names: str) -> Kind:
-    """One of some texts."""
+    """Kind of a text out of ``names``."""
     words = " or ".join(f'"{name}"' for name in names)
     return Kind(words, lambda value: isinstance(value, str) and value in names)
 
 
 def count(most: int) -> Kind:
-    """A whole number from 1 on."""
+    """Kind of a whole number from 1 to ``most``."""
     return Kind(f"a whole number from 1 to {most}", lambda value: _whole(value) and 1 <= value <= most)
 
 

@@ -174,7 +174,7 @@ class Sweeper:
                 out[name + suffix][(rows, *place, k)] = values if self.request.observation else values[:, 0]
 
     def _fill_together(self, incidences: FloatArray, out: Arrays) -> None:
-        """Fields by T-matrices, or by the equation of a body that nothing else serves."""
+        """Fields by T-matrices, or by the equation of a body without another method."""
         request, cases = self.request, self._cases()
         for number, case in enumerate(cases):
             (_, wavenumber), (name, place, suffix) = case

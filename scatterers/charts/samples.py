@@ -99,7 +99,7 @@ def step_onto(level: FloatArray, gradient: FloatArray, reach: float | FloatArray
 
 
 def towards(compiled: Compiled, points: FloatArray, steps: int, reach: float | FloatArray = np.inf) -> FloatArray:
-    """Points (..., 3), L, after so many Newton steps onto F = 0, none longer than ``reach``, L."""
+    """Points (..., 3), L, after ``steps`` Newton steps onto F = 0, none longer than ``reach``, L."""
     for _ in range(steps):
         value, gradient, _ = evaluated(compiled, points)
         step, _ = step_onto(value, gradient, reach)

@@ -202,14 +202,14 @@ class RadialMap(SphereMapped):
 
 
 def star_map(space: SpaceLevel, samples: Samples, centre: FloatArray | None) -> tuple[RadialMap | None, str]:
-    """Sphere map with a spine if the body is not upright and that does, without one otherwise.
+    """Sphere map of a star-shaped body; a body that is not upright is tried with a spine first.
 
     Returns
     -------
     RadialMap or None
         None if the body is not star-shaped.
     str
-        What is wrong then.
+        Why there is no map; else empty.
     """
     points = samples.crossings()
     spines = [Spine.through(samples.values < 0, samples.origin, samples.spacing), Spine.none()]

@@ -180,7 +180,7 @@ def _bend(compiled: Compiled, points: FloatArray, reach: float) -> tuple[FloatAr
 
 
 def samples_of(space: ExpressionSpace, box: FloatArray, nodes: int) -> Samples:
-    """F on a grid of nearly cubic cells with so many nodes along the longest side."""
+    """F on a grid of nearly cubic cells with ``nodes`` along the longest side."""
     side = box[1] - box[0]
     counts = np.clip(np.ceil(side / side.max() * (nodes - 1)).astype(int) + 1, 17, nodes)
     axes = [np.linspace(box[0, k], box[1, k], counts[k]) for k in range(3)]
@@ -233,7 +233,7 @@ def _beyond(samples: Samples, half: float) -> bool:
 
 
 def tightened(space: ExpressionSpace, samples: Samples) -> FloatArray:
-    """Box (2, 3), L, around the nodes inside, sampled anew until it fits."""
+    """Box (2, 3), L, just around the nodes with F < 0, sampled again four times."""
     for _ in range(4):
         low, high = samples.inside
         # wider than the body by a part of its half widths

@@ -171,7 +171,7 @@ def _product(a: FloatArray, b: FloatArray) -> float:
 
 
 def spacing_of(points: FloatArray, nodes: float) -> float:
-    """Spacing at which the grid about points (n, 3) has so many nodes, L."""
+    """Spacing, L, at which the grid about points (n, 3), L, has ``nodes``."""
     return side_of_cells(np.ptp(points, axis=0), 2 * PADDING + 5, nodes)
 
 

@@ -27,7 +27,7 @@ NODAL = np.array([1, 26, 66, 26, 1]) / 120
 
 
 def side_of_cells(box: FloatArray, more: float, most: float) -> float:
-    """Side at which a box (3,), L, with ``more`` cells along each axis has so many of them at most."""
+    """Side, L, of cells in a box (3,), L, with ``more`` along each axis: at most ``most`` cells."""
     low, high = 0.0, float(box.max())
     for _ in range(60):
         middle = 0.5 * (low + high)

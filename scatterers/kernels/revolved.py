@@ -44,7 +44,7 @@ class Layout(NamedTuple):
 
 
 class Row(NamedTuple):
-    """Of a row: point and unit tangent (w, r) at both ends, piece, whether it is a spline, where its shape begins.
+    """Row: point and unit tangent (w, r) at both ends, piece, whether it is a spline, where its shape begins.
 
     Then the sign of the corner before.
     """

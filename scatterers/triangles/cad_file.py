@@ -111,7 +111,7 @@ class CadReading:
 def read_cad(path: Path, reading: CadReading, *, curved: int = 0, progress: Callable[[str], None]) -> CadPoints:
     """Read a STEP, IGES or BREP file by gmsh.
 
-    With ``curved``, triangles are smaller where faces curve: so many to a full turn.
+    ``curved`` is the number of triangles per full turn of a curved face; 0 is an even mesh.
 
     Raises
     ------

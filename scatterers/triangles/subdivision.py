@@ -62,7 +62,7 @@ class Subdivision(NamedTuple):
 
 
 def subdivided(vertices: FloatArray, triangles: IntArray, times: int, note: Note) -> Subdivision:
-    """Loop's subdivision, so many times, of vertices that are moved first by what it would move them; how far is told.
+    """Loop's subdivision, ``times`` times; vertices are first moved against its shift, which ``note`` is told.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def subdivided(vertices: FloatArray, triangles: IntArray, times: int, note: Note
 
 
 def edges_where_curved(vertices: FloatArray, triangles: IntArray, curvature: FloatArray) -> float:
-    """Mean edge at vertices (n, 3) with such curvatures (n,), weighted by the fourth power of these, L.
+    """Mean edge at vertices (n, 3), L, weighted by the fourth power of ``curvature`` (n,), 1/L.
 
     It is the edge that has to show the curvature, and half the mean edge or less where a mesh is drawn out. Vertices
     without a curvature do not count; if all are such, all do.

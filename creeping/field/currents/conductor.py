@@ -99,7 +99,7 @@ class ConductorCurrents(SurfaceCurrents):
         return np.stack([self._at_least(self._rms(electric)), self._left])
 
     def total(self, points: FloatArray, dark: BoolArray) -> tuple[ComplexArray, FloatArray]:
-        """Incident and scattered E and H (m, 6, p) at points (m, 3), L, some in the dark, and their error (m, p)."""
+        """Incident and scattered E and H (m, 6, p) at points (m, 3), L, some in the shadow, and their error (m, p)."""
         scattered = np.concatenate([self.scattered_electric(points), self.scattered(points)], axis=1)
         left, (lit, shadow, factor) = self.left_of_each, self._levels
         shapes = (
@@ -175,7 +175,7 @@ def lit_vectors(
 def amplitudes(
     normals: FloatArray, axes: FloatArray, direction: FloatArray, electric: ComplexArray
 ) -> tuple[ComplexArray, ComplexArray]:
-    """H = H0.b and e = E0.b (n, p) of incident waves E0 (3, p), b = n x a."""
+    """h = H0.b and e = E0.b (n, p) of incident waves E0 (3, p), b = n x a."""
     b = np.cross(normals, axes)
     return np.asarray(b @ np.cross(direction, electric, axisb=0).T), np.asarray(b @ electric)
 
@@ -221,7 +221,7 @@ def ray_scalars(rays: RayPoints, wavenumber: float, order: int) -> tuple[Complex
 
 
 def spread_of(rays: RayPoints, wavenumber: float) -> FloatArray:
-    """1/J (...), held where rays cross: J is known to be no narrower than the boundary layer there."""
+    """1/J (...), bounded where rays cross: J is known to be no narrower than the boundary layer there."""
     m = scales(rays, wavenumber)[1]
     return np.asarray(rays.spreading / (rays.spreading**2 + 1 / m**4))
 
@@ -302,7 +302,7 @@ class ConductorWaves:
 
     @cached_property
     def changing(self) -> StripTable:
-        """C of creeping modes, 0 where they have ended."""
+        """Du/(2m^2 u) of creeping modes, 0 where they have ended."""
         strips, times, table = self.hard.strips, self.hard.times, []
         for strip in strips:
             alive, ratio = strip.rays.alive, np.zeros(strip.rays.alive.shape, dtype=complex)
@@ -312,7 +312,7 @@ class ConductorWaves:
         return StripTable(strips, times, table)
 
     def _heights(self, strip: int, sigma: FloatArray, _: FloatArray) -> ComplexArray:
-        """H and e of the incident waves where rays at places (n,) of a strip begin: (n, 2, p)."""
+        """h and e of the incident waves where rays at places (n,) of a strip begin: (n, 2, p)."""
         rays, back = self._starts(strip, sigma)
         axes = np.broadcast_to(self.direction, rays.first_normal.shape)
         return np.stack(amplitudes(rays.first_normal, axes, self.direction, self.electric), axis=1)[back]
@@ -324,5 +324,5 @@ class ConductorWaves:
 
 
 def faded(curvature: FloatArray, twist: FloatArray, first: FloatArray) -> FloatArray:
-    """T rho (n,), fading out as Lambda does where the body is much flatter than at the launch point, ``first``, 1/L."""
+    """t rho (n,), fading out as Lambda does where the body is much flatter than at the launch point, ``first``, 1/L."""
     return turn_of(curvature, twist) * smoothstep(curvature / first, 0.0, FLAT)

@@ -74,7 +74,7 @@ class Ground(NamedTuple):
     Attributes
     ----------
     cosine : (n,)
-        C = -n.d, to a little below 0.
+        c = -n.d, to a little below 0.
     along, across, twist : (n,), 1/L
         Normal curvatures kappa_a and kappa_b, and the entry t of the shape operator between both directions.
     rate, bend : (n,)

@@ -60,7 +60,7 @@ class LitNodes:
     weights : (n,), L^2
         Of the quadrature, times the share of the lit side.
     cosine : (n,)
-        C = -n.d.
+        c = -n.d.
     along, across : (n,), 1/L
         Normal curvatures along and across the plane of incidence.
     rate, bend : (n,)
@@ -121,7 +121,7 @@ class RayNodes:
 
 
 def plane_of_incidence(nodes: BodyNodes, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """C = -n.d and the normal curvatures, 1/L, along and across the plane of incidence (n,)."""
+    """c = -n.d and the normal curvatures, 1/L, along and across the plane of incidence (n,)."""
     along = nodes.curvature(axes_of_incidence(nodes.normals, direction))
     return -nodes.normals @ direction, along, nodes.total_curvature - along
 

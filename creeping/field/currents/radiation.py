@@ -19,9 +19,9 @@ Also here: what the lit side that faces other parts of the body receives from th
     conductor  J(x) += 2 n_x x int_(t > 0) W(t) grad_x G x J dS_y
 
 over all the body's currents above the horizon of x, t = n_x.(y - x)/|y - x|; W is a smooth step from 0 to 0.3, without
-which the cut at the horizon would radiate. What is above the horizon throws light on x, or shadow: its currents cancel
-the incident wave behind it. A convex body has nothing there. What goes to and fro more often is left out, and what
-ground in the dark receives. An impedance has no bounce: where it was tried, eta = 0.5, it made fields no better.
+which the cut at the horizon would radiate. What is above the horizon lights or shadows x: its currents cancel the
+incident wave behind it. A convex body has nothing there. What goes to and fro more often is left out, and what
+the shadow side receives. An impedance has no bounce: where it was tried, eta = 0.5, it made fields no better.
 
 Sources: [CK13, sec. 2.2 and 6.2], [BMK19]; Derivations, F16, F17 and F29.
 """
@@ -37,7 +37,7 @@ from creeping.geometry.surface import Surface, memo
 from creeping.kernels.threads import in_threads
 
 LOW = 0.3
-"""T up to which W rises."""
+"""t up to which W rises."""
 BLOCK = 16
 """Nodes that are looked at together, neighbours in space."""
 Nodes = tuple[FloatArray, FloatArray]
@@ -70,13 +70,13 @@ def phase_sums(points: FloatArray, weights: ComplexArray, directions: FloatArray
 
 
 def grid_cells(widths: FloatArray, wavenumber: float) -> float:
-    """Cells of the transform's grid for nodes in a box of such widths (3,), L, and all directions."""
+    """Cells of the transform's grid for nodes in a box of ``widths`` (3,), L, and all directions."""
     # two for each that the bandwidth asks for, and twenty more along a side
     return float(np.prod(2 * wavenumber * widths / np.pi + 20))
 
 
 def transformed(nodes: int, directions: int, cells: float) -> bool:
-    """Whether directions are worth a transform of so many cells, 0.6 GB of them at most."""
+    """Whether a transform of ``cells``, at most 0.6 GB, is faster than direct sums."""
     # what a node and a cell cost, in terms of one direction seen from one node
     return cells <= 40_000_000 and 1500.0 * nodes + 60.0 * cells < nodes * directions
 
@@ -168,7 +168,7 @@ def _has_saddles(gauss: FloatArray, square: FloatArray) -> bool:
 
 
 def may_self_reflect(body: Surface) -> bool:
-    """`self_reflects` of all ground, by points all over a body."""
+    """`self_reflects` of the whole surface of a body, lit or not."""
 
     def found() -> bool:
         points = points_of_charts(body)

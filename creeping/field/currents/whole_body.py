@@ -58,13 +58,13 @@ from creeping.geometry.surface import Surface
 from creeping.storage.parts import Keeping, not_kept
 
 DEPTH = 0.25
-"""Least depth, in wavelengths, of the points inside at which currents are judged: nearer the sums over nodes err."""
+"""Least depth, in wavelengths, of the points inside at which currents are tested: nearer the sums over nodes err."""
 SHALLOW = 0.12
 """Least depth where the body is too thin for that."""
 POINTS = 100
-"""Points inside at which they are judged."""
+"""Points inside at which currents are tested."""
 OFF = 0.25
-"""Least distance from the body, in wavelengths, at which currents serve."""
+"""Least distance from the body, in wavelengths, at which currents are valid."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -228,7 +228,7 @@ class SurfaceCurrents:
         return np.asarray(np.hypot(error, 0.0 if self.solved else 4e-4 * self._amplitude))
 
     def total(self, points: FloatArray, dark: BoolArray) -> tuple[ComplexArray, FloatArray]:
-        """Total field and its error at points (m, 3), L, off the body, some of them in the dark: (m,) each."""
+        """Total field and its error at points (m, 3), L, off the body, some of them in the shadow: (m,) each."""
         lit, shadow, factor = self._levels
         if self.boundary.kind == "impedance":
             # most of what is wrong with its currents stands at the line and radiates ahead
@@ -360,7 +360,7 @@ def far_enough(body: Surface, wavenumber: float, points: FloatArray, least: floa
 def level_at(
     currents: SurfaceCurrents, points: FloatArray, dark: BoolArray, mean: float, lit: float, shadow: float
 ) -> FloatArray:
-    """L s (n,) at points (n, 3), L, some in the dark, with f_rms = ``mean`` and L in the light and the shadow."""
+    """L s (n,) at points (n, 3), L, with f_rms = ``mean`` and L in the light and the shadow."""
     middle = np.mean(np.asarray(currents.body.bounds, dtype=float), axis=0)
     away = np.linalg.norm(points - middle, axis=1)
     in_shadow = shadow / np.hypot(1, away / (currents.wavenumber * mean**2))

@@ -188,7 +188,7 @@ def facet_tiles(
 
 
 def _patches(body: Faceted) -> Patches:
-    """Squares of a body, made once."""
+    """Squares of a body, cached."""
     return memo(body, "facet patches", lambda: facet_patches(body))
 
 

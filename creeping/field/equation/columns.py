@@ -59,7 +59,7 @@ class Columns(NamedTuple):
 
 
 def matrix_bytes(nodes: int, boundary: Boundary, parts: int) -> float:
-    """Bytes of the matrix in blocks of so many parts of the body that are images of each other."""
+    """Bytes of the matrix in blocks, for ``parts`` of the body that are images of each other."""
     entries = 8.0 * nodes**2 * (4 if boundary.kind == "conductor" else 1) / parts
     # one block is transposed
     return entries * (1 + 1 / parts) if boundary.kind == "soft" else entries

@@ -259,7 +259,7 @@ class _OnTiles(SurfaceCurrents):
         return np.asarray(away * self.wavenumber <= 2 * np.pi * APART)
 
     def total(self, points: FloatArray, dark: BoolArray) -> tuple[ComplexArray, FloatArray]:
-        """Total field and its error at points (m, 3), L, at any distance, dark or not."""
+        """Total field and its error at points (m, 3), L, at any distance, lit or not."""
         return self.incident_at(points) + self._scattered_at(points), self.error_around(points)
 
     def _scattered_at(self, points: FloatArray) -> ComplexArray:
@@ -340,7 +340,7 @@ class _OnTiles(SurfaceCurrents):
 
     @cached_property
     def inner_points(self) -> FloatArray:
-        """Points inside the body at which the currents are judged (m, 3), L."""
+        """Points inside the body at which the currents are tested (m, 3), L."""
         if self.matrix.inside is None:
             self.matrix.inside = inside_points(self.body, self.matrix.tiles, 2 * np.pi / self.wavenumber)
         return self.matrix.inside

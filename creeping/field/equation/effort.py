@@ -66,7 +66,7 @@ class Plan(NamedTuple):
 
 
 class Load(NamedTuple):
-    """Of the equation on tiles: nodes; seconds of near tiles, of all made once and of a column's product; bytes.
+    """Load of the equation on tiles: nodes; seconds of near tiles, of setup and of a column's product; bytes.
 
     ``parts`` of the body are images of each other (`creeping.field.equation.mirrors`).
     """
@@ -147,7 +147,7 @@ def kind_columns(kind: Boundary) -> int:
 
 
 def near_seconds(nodes: float, pairs: float, p: int, kind: Boundary, *, flat: bool) -> float:
-    """Seconds of integrals over tiles of p x p nodes near to nodes and to the points beneath them, in so many pairs."""
+    """Seconds of integrals over tiles of p x p nodes near to nodes and to the points beneath them, in ``pairs``."""
     vector = (NEAR_FLAT if flat else NEAR_CURVED) if kind.kind == "conductor" else 1.0
     node, pair = (first + more * p**2 for first, more in (PER_NODE, PER_PAIR))
     return 2 * (nodes * node + pairs * pair) * vector / thread_count()

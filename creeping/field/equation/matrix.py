@@ -7,7 +7,7 @@
 
 less i times the same at x' = x - h n, kh = pi/2, where there is no 1, and where soft bodies have their own dG/dn_x.
 u(x) - M u and M u (x') are what the field that u gives inside the body is, at its surface and under it, so both are 0:
-one of them lets waves stand inside at resonances, the two together see what goes in and throw nothing back.
+one of them alone has the resonances of the interior, the two together have none.
 
 In the unknowns u sqrt(w) the transpose in the weights is that of the matrix. What a tile sends to points near it is
 integrated with the polynomials through its nodes, of J by Cartesian components less their part along the normal.
@@ -241,9 +241,9 @@ class Matrix:
     root : (n,)
         sqrt(w).
     inside : (m, 3), L, or None
-        Points inside the body at which currents are judged, once they are known.
+        Points inside the body at which currents are tested, once they are known.
     many : bool
-        Whether many incidences are to be judged.
+        Whether many incidences are to be tested.
     products : list of callable
         Blocks of it times columns, once they are made, of a matrix that is small enough to be kept.
     """
@@ -349,9 +349,9 @@ class Matrix:
         return np.zeros(0, dtype=complex)
 
     def near(self, places: Places, kind: str) -> tuple[IntArray, IntArray, ComplexArray]:
-        """Of tiles near places: numbers of these (pairs,), those of the nodes (pairs, p p), and the integrals.
+        """Integrals over tiles near places, with numbers of the places (pairs,) and of the nodes (pairs, p p).
 
-        These are (pairs, p p), of a conductor (pairs, 2, p p, 2), of what is times 4 pi.
+        Integrals are (pairs, p p), of a conductor (pairs, 2, p p, 2), and are times 4 pi.
         """
         tiles, pp, single = self.tiles, self.tiles.p**2, self.single(kind)
         near = tiles.near(places.points)
@@ -413,7 +413,7 @@ def _across(found: ComplexArray, of: Places, q: FloatArray) -> ComplexArray:
 
 
 def second_surface(tiles: Tiles, wavenumber: float) -> tuple[IntArray, FloatArray]:
-    """Nodes that have a point x' beneath them, and these points (s, 3), L, clear of all nodes."""
+    """Nodes (s,) with a point x' = x - h n inside the body, clear of all nodes, and x' (s, 3), L."""
     from scipy.spatial import cKDTree
 
     tree, x, n = cKDTree(tiles.points), tiles.points, tiles.normals

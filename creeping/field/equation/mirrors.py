@@ -84,7 +84,7 @@ class Mirrors(NamedTuple):
 def mirrors_of(tiles: Tiles, boundary: Boundary, center: FloatArray | None = None) -> Mirrors:
     """Symmetries of the nodes of tiles about a centre, their own if it is not given; none where the admittance varies.
 
-    Those about their own centre are found once.
+    Those about their own centre are cached.
     """
     n, c = len(tiles.points), 2 if boundary.kind == "conductor" else 1
     if boundary.varies:

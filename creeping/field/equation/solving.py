@@ -159,7 +159,7 @@ def solution_for(body: Surface, direction: FloatArray, wavenumber: float, bounda
 
 
 def asked_solution(body: Surface, direction: FloatArray, wavenumber: float, boundary: BoundaryLike) -> Solved:
-    """The same, if it costs less than ASKED.
+    """As `solution_for`, up to the cost ASKED.
 
     Raises
     ------
@@ -208,7 +208,7 @@ def solved_alone(
     tell: Callable[[str], None] = say,
     keep: Keeping = not_kept,
 ) -> Solution:
-    """The solution for unit directions (m, 3) of a body that nothing else serves, within ASKED for one of them.
+    """The solution for unit directions (m, 3) of a body without another method, within ASKED for one of them.
 
     As it is within SECONDS where it can be, unless fine tiles are asked for; ``keep`` has columns as they are solved.
 

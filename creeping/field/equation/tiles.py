@@ -225,7 +225,7 @@ class Tiles:
 
     @cached_property
     def fine_tree(self) -> Any:
-        """Of the fine nodes: a distance from these is one from the body but for half of what they are apart."""
+        """k-d tree of the fine nodes: distances from these are those from the body, to half their spacing."""
         from scipy.spatial import cKDTree
 
         return cKDTree(self.fine[0])

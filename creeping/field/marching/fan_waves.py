@@ -105,7 +105,7 @@ def resampled(strip: Strip, values: ComplexArray, times: FloatArray) -> ComplexA
 
 
 def modes_on_strip(strip: Strip, times: FloatArray, k: float, kind: Boundary) -> tuple[ComplexArray, FloatArray]:
-    """Y of creeping modes on a strip's rays and its error (rays, steps), infinite where they have ended."""
+    """y of creeping modes on a strip's rays and its error (rays, steps), infinite where they have ended."""
     rays = strip.rays
     plain = without_tubes(rays)
     waves = surface_waves(plain, k, kind, 2), surface_waves(plain, k, kind, 1)
@@ -145,19 +145,19 @@ class FanWaves:
 
     @property
     def wavenumber(self) -> float:
-        """K, 1/L."""
+        """k, 1/L."""
         return self.marched.wavenumber
 
     def at(self, strip: int, sigma: FloatArray, s: FloatArray) -> ComplexArray:
-        """Y at places (n,) of a strip: (n,)."""
+        """y at places (n,) of a strip: (n,)."""
         return self._table.at(strip, sigma, s)
 
     def slope(self, strip: int, sigma: FloatArray, s: FloatArray) -> ComplexArray:
-        """Its derivative y_s, 1/L times its unit, at places (n,) of a strip: (n,)."""
+        """Derivative y_s, 1/L times the unit of y, at places (n,) of a strip: (n,)."""
         return self._table.at(strip, sigma, s, ds=1)
 
     def across(self, strip: int, sigma: FloatArray, s: FloatArray) -> ComplexArray:
-        """Its derivative in sigma at places (n,) of a strip: (n,)."""
+        """Derivative of y in sigma at places (n,) of a strip: (n,)."""
         return self._table.at(strip, sigma, s, dsigma=1)
 
     def error(self, strip: int, sigma: FloatArray, s: FloatArray) -> FloatArray:
@@ -166,7 +166,7 @@ class FanWaves:
         return np.asarray(self._tables[strip][1][ray, np.clip(np.searchsorted(self.times, s), 0, len(self.times) - 1)])
 
     def along(self, ray: IntArray, times: FloatArray) -> tuple[ComplexArray, FloatArray]:
-        """Y and its error on the fan's own rays (n,), by their numbers, at times (n,), L: (n,) each."""
+        """y and its error on the fan's own rays (n,), by their numbers, at times (n,), L: (n,) each."""
         y, error = np.zeros(len(ray), dtype=complex), np.full(len(ray), np.inf)
         for number, rows in enumerate(self.rows):
             place = np.full(len(self.ends), -1)
@@ -178,7 +178,7 @@ class FanWaves:
 
     @cached_property
     def _tables(self) -> list[tuple[ComplexArray, FloatArray]]:
-        """Y and its error (rays, steps) of each strip, by marching and by modes."""
+        """y and its error (rays, steps) of each strip, by marching and by modes."""
         found, favour = [], FAVOUR.get(self.boundary.kind, 1.0)
         for strip, rows in zip(self.strips, self.rows, strict=True):
             y, error = self._by_marching(rows)
@@ -197,7 +197,7 @@ class FanWaves:
         return found
 
     def _by_marching(self, rows: IntArray) -> tuple[ComplexArray, FloatArray]:
-        """Y and its error on rays (rows, steps), infinite where nothing could be marched."""
+        """y and its error on rays (rows, steps), infinite where nothing could be marched."""
         m = self.marched
         y = np.stack([m.at(ray, self.times) for ray in rows])
         error = np.stack([np.interp(self.times, m.s[ray], m.error[ray]) for ray in rows])
@@ -250,7 +250,7 @@ def march_alone(body: Surface, boundary: Boundary) -> bool:
 
 
 def marchable(fan: RayFan, boundary: Boundary, order: int, fewest: int = 8) -> bool:
-    """Whether the waves of a fan can be marched, with at least so many rays on each of its strips."""
+    """Whether the waves of a fan can be marched, with at least ``fewest`` rays on each strip."""
     strips = fan_strips(fan)
     return (
         order == 2
@@ -266,7 +266,7 @@ def marchable(fan: RayFan, boundary: Boundary, order: int, fewest: int = 8) -> b
 
 
 def fan_waves(fan: RayFan, *, wavenumber: float, boundary: Boundary) -> FanWaves:
-    """Marched waves of a fan, made once for each of the last wavenumbers and boundaries."""
+    """Marched waves of a fan, cached for the last wavenumbers and boundaries."""
 
     def make() -> FanWaves:
         marched = march_rays(fan_profiles(fan, boundary), wavenumber=wavenumber, boundary=boundary)
@@ -294,14 +294,14 @@ class OnRays(NamedTuple):
 
 
 def scalar_on_rays(waves: FanWaves, shed: ShedRays) -> OnRays:
-    """Y of the rays found (m,)."""
+    """y of the rays found (m,)."""
     y, off = at_shed(shed, len(waves.strips), waves.at, waves.error)
     with np.errstate(divide="ignore", invalid="ignore"):
         return OnRays(y, np.abs(y), np.where(np.abs(y) > 0, off / np.abs(y), 0.0))
 
 
 def at_shed(shed: ShedRays, strips: int, *functions: Callable[[int, FloatArray, FloatArray], Any]) -> list[Any]:
-    """Functions of places sigma, s of a strip at the rays found (m,): (m, ...) each."""
+    """Values (m, ...) of each function(strip, sigma, s), s in L, for the m rays of ``shed``."""
     rows = [np.flatnonzero(shed.strip == number) for number in range(strips)]
     places = [(number, shed.sigma[mine], shed.rays.time[mine]) for number, mine in enumerate(rows)]
     back = np.argsort(np.concatenate(rows))

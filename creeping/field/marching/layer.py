@@ -7,8 +7,8 @@ its tube and its phase:
     X = [h^2 d_nn + h kappa_n d_n]/k^2 + h^2 - 1 + ((kappa_n - kappa_t)^2 - kappa_n^2)/(4k^2)
     soft u = 0;   else u_n + ik eta u = 0:   y_n + (ik eta - kappa_t/2) y = 0
 
-Nothing here asks for convex or smooth ground, and amplitudes of any order come out. The scattered wave starts on lit
-ground as that of optics and is driven by the incident one on the surface; where the ray has turned away the incident
+The surface need be neither convex nor smooth, and amplitudes of any order come out. The scattered wave starts on the
+lit side as that of optics and is driven by the incident one on the surface; where the ray has turned away the incident
 wave is added, and the total goes on by itself. Waves that come back along the ray are left out.
 
 Also here: how far a marched wave may be off: what the one-way equation, its start and its arithmetic leave out.
@@ -52,7 +52,7 @@ from creeping.field.marching.profile import LayerGrid, RayProfiles, layer_grid
 from creeping.kernels.threads import in_threads
 
 ORDER = 4
-"""P of the rational steps."""
+"""Order p of the rational steps."""
 PER_OCTAVE = 8
 """Tabulated steps in a factor 2 of delta."""
 

@@ -6,7 +6,7 @@ the tangent to d, and psi that by which it has turned away behind the line:
     start     kappa > 0 and sin^3(alpha)/kappa largest for alpha of 50..75 degrees: optics is best there
     switch    the last place with psi < min(1/m, 60 degrees) before psi = 100 degrees
     steps     0.12 L, in the driven part at most 0.3 wavelengths
-    height    20 delta; over flatter ground max(20 delta, min(14 delta(kappa_min), 6 sqrt(flat length/k)))
+    height    20 delta; where flatter max(20 delta, min(14 delta(kappa_min), 6 sqrt(flat length/k)))
     elements  0.2 delta(kappa_max) on the surface growing to min(0.6 delta, 1.3/(k sin alpha))
     twist     up to 8 delta
 
@@ -30,13 +30,13 @@ from creeping.field.marching.profile import CAP, KEPT_BELOW, GridSpec, RayProfil
 AWAY = np.radians(100.0)
 """Angle behind the line at which a ray has turned away for good."""
 FLAT = 0.3
-"""Share of the curvature at the shadow line below which ground is flat."""
+"""Share of the curvature at the shadow line below which the surface is flat."""
 LEAST_CURVATURE = 0.05
 """Share of the largest curvature that scales are taken from at least."""
 
 
 class MarchStatus(IntEnum):
-    """What is to be thought of a marched wave."""
+    """Status of a marched wave."""
 
     OK = 0
     SHARP = 1
@@ -46,7 +46,7 @@ class MarchStatus(IntEnum):
     UNLIT = 3
     """No convex part of the lit side to start from: there is no wave."""
     HOLLOW = 4
-    """Concave ground in the light behind the start: what it throws along the body is left out everywhere."""
+    """The lit side behind the start is concave: what it reflects along the body is left out everywhere."""
     UNSTABLE = 5
     """The march did not stay finite: there is no wave."""
 
@@ -170,7 +170,7 @@ def _status(
 def _too_deep(s: FloatArray, look: FloatArray, depth: float, served: BoolArray) -> float:
     """Place behind which the chord over a dip is higher than ``depth`` above it, or too steep; infinite if none is.
 
-    The chord begins at the last place before the dip whose tangent no ground ahead rises above.
+    The chord begins at the last place before the dip whose tangent no later place rises above.
     """
     if not np.isfinite(depth):
         return np.inf

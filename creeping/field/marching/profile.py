@@ -1,6 +1,6 @@
 """What a ray is to the layer that is marched along it: its curvatures, twist, spreading and admittance.
 
-The layer sees the ground under a ray by kappa_n and kappa_t, by its torsion tau = b.dn/ds, b = n x p, and the wave by
+The layer knows the surface under a ray by kappa_n and kappa_t, by its torsion tau = b.dn/ds, b = n x p, and the wave by
 how it varies along and across the ray:
 
     D y = Lambda y_s,   D = (1/J) [d/dsigma_perp - (d.x0)' d/ds]   along b on a wavefront
@@ -171,7 +171,7 @@ class GridSpec:
     element, first : float, L
         Longest element, and the one on the surface.
     cap : float, L
-        c, or infinite on convex ground.
+        c, or infinite on a convex surface.
     twist : float, L
         c_t.
     wavenumber : float, 1/L

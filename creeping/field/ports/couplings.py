@@ -385,7 +385,7 @@ def _tangential(axes: ArrayLike, normals: FloatArray) -> FloatArray:
 def port_geodesics(
     body: Surface, ports: FloatArray, k: float, length: Length, *, sources: int | None = None
 ) -> PortRays:
-    """All between ports (n, 3), L, up to a length, L; from the first so many, if not from all."""
+    """Geodesics up to ``length``, L, from the first ``sources`` (or all) of the ports (n, 3), L, to all."""
     # so far from a caustic a port is close to it
     pad = float(2 * np.cbrt(size(body) / k**2))
     if not (isinstance(length, str) and length == AUTO):

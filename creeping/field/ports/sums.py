@@ -40,7 +40,7 @@ DENSE = (0.22, 0.08, 64)
 """Angle between beams, in (ka)^(-1/2), steps, in a/(ka)^(1/3), and half of the least number of beams: half of the first
 two changes less than 0.1 of the stated error (``tests/field/test_port_beams.py``)."""
 CUTS, APART = (2.5, 3.8, 1.6), 0.8
-"""Where beams begin, in their widths, the first that serves: no geodesic may end within so many widths of it. What
+"""Where beams begin, in their widths, the first that is valid: no geodesic may end within so many widths of it. What
 other beginnings change is within the stated error of 95 of 100 pairs (``tests/field/test_port_beams.py``)."""
 
 
@@ -171,7 +171,7 @@ class PortSums:
 
 
 def port_sums(waves: PathWaves) -> PortSums:
-    """What geodesics bring, judged, or beams in their place."""
+    """Sums over geodesics, or beams for them, with error and status."""
     rays, k = waves.rays, waves.wavenumber
     shape = rays.folds.shape
     count, pair = rays.folds.size, rays.first * shape[1] + rays.second

@@ -74,7 +74,7 @@ class Path(NamedTuple):
 
 
 def path_of(rays: PortRays, wavenumber: float) -> Path:
-    """Of all geodesics (m,)."""
+    """`Path` of all geodesics (m,)."""
     ends = rays.curvature, rays.torsion, rays.bend
     return Path(wavenumber, rays.arclength, *ends, rays.integrals, rays.turning)
 
@@ -96,7 +96,7 @@ def second_order(
     early: Callable[[IntArray, ComplexArray], ComplexArray],
     late: Callable[[IntArray, int], ComplexArray],
 ) -> ComplexArray:
-    """What second order adds (m,) to ``plain``: early under the integral at small ξ, late by so many modes beyond.
+    """What second order adds (m,) to ``plain``: early under the integral at small ξ, late by modes beyond.
 
     ``early(rows, plain)`` and ``late(rows, count)`` are asked for the rows that each serves, and blended.
     """

@@ -168,7 +168,7 @@ class ConductorCurrent(ArrayResult, PointData):
 def vector_near(
     columns: list[PointValues], points: FloatArray, incident: ComplexArray, facts: dict[str, Any], *, single: bool
 ) -> ConductorField:
-    """E and H of each polarisation at points (..., 3), judged, in the parts that a reader wants.
+    """Result from E and H of each polarisation at points (..., 3), with parts and status.
 
     ``incident`` (n, 6, p) is the incident wave there.
     """
@@ -189,7 +189,7 @@ def vector_on_body(
     *,
     single: bool,
 ) -> ConductorCurrent:
-    """J of each polarisation, and n.E with its error (n, p), at points of the body (..., 3), judged."""
+    """Result from J of each polarisation and n.E with its error (n, p) at points of the body (..., 3)."""
     names = {"values": "values", "lit": "wave", "creeping": "creeping"}
     lanes = {name: [getattr(one, of) for one in columns] for name, of in names.items()}
     lanes |= {"charge": list(charge[0].T), "charge_error": list(charge[1].T)}

@@ -256,12 +256,12 @@ def spherical_frame(directions: FloatArray) -> FloatArray:
 
 
 def incident_mix(polarisation: str | ArrayLike | None, direction: FloatArray) -> ComplexArray:
-    """Components along theta and phi of incident waves of unit E, both of them for None: (2, p).
+    """Components along theta and phi of incident waves with |E| = 1: (2, p); None is both waves.
 
     Raises
     ------
     InvalidInputError
-        If a polarisation is no text known, not three finite numbers, 0, or not across the direction.
+        If E0 is an unknown text, not three finite numbers, 0, or not perpendicular to the direction.
 
     Examples
     --------

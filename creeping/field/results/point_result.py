@@ -76,7 +76,7 @@ _REMEDIES = {
 def judged(
     status: IntArray, values: ComplexArray | FloatArray, error: FloatArray, error_by: np.ndarray[Any, Any], unit: float
 ) -> IntArray:
-    """Status (...) with UNRESOLVED in place of OK; ``unit`` is the incident wave's amplitude, k (1/L) for du/dn."""
+    """Status (...), UNRESOLVED for OK if the error is large; ``unit`` is the incident amplitude, k (1/L) for du/dn."""
     with np.errstate(invalid="ignore"):
         # half the value, or a tenth of the incident wave: as `FieldStatus.UNRESOLVED` says
         enough = (error <= np.maximum(0.5 * np.abs(values), 0.1 * unit)) & (error_by != "bound")
@@ -240,7 +240,7 @@ class SurfaceField(PointField):
         (waves marched along rays, with beams near caustics), "lit+rays" or "lit+march" in the penumbra, or "equation".
     lit, creeping : (...) complex
         Parts that add up to the values: the lit side's expansion, and creeping rays. For "equation": the values on
-        the lit side, and those on the dark side.
+        the lit side, and those on the shadow side.
 
     Examples
     --------
@@ -270,7 +270,7 @@ class PointValues(Rows):
     Attributes
     ----------
     wave : (n,) complex
-        The incident wave and what it excites by currents or on the lit side; 0 where creeping rays alone serve.
+        The incident wave and what it excites by currents or on the lit side; 0 where creeping rays are alone.
     creeping : (n,) complex
         Of creeping rays.
     error : (n,)
@@ -345,7 +345,7 @@ def by_polarisation(values: Sequence[np.ndarray[Any, Any]], shape: tuple[int, ..
 
 
 def stated(columns: list[PointValues], points: FloatArray, unit: float, *, single: bool = True) -> dict[str, Any]:
-    """What results at points (..., 3) have in common, of the field of each polarisation, judged by its ``unit``."""
+    """Error, its source, method, status and points (..., 3) of a result; ``unit`` as in `judged`."""
     lanes = {name: [getattr(one, name) for one in columns] for name in ("error", "error_by", "method")}
     lanes["status"] = [judged(one.status, one.magnitude, one.error, one.error_by, unit) for one in columns]
     shape = points.shape[:-1]
@@ -354,7 +354,7 @@ def stated(columns: list[PointValues], points: FloatArray, unit: float, *, singl
 
 
 def scalar_near(field: PointValues, points: FloatArray, incident: ComplexArray, facts: dict[str, Any]) -> NearField:
-    """The field at points (..., 3), judged, in the parts that a reader wants."""
+    """Result from the field at points (..., 3), with its parts and status."""
     shape = points.shape[:-1]
     parts = [one.reshape(shape) for one in field.parts(incident)]
     names: dict[str, Any] = dict(zip(("incident", "scattered", "creeping"), parts, strict=True))
@@ -362,7 +362,7 @@ def scalar_near(field: PointValues, points: FloatArray, incident: ComplexArray, 
 
 
 def scalar_on_body(field: PointValues, points: FloatArray, unit: float, facts: dict[str, Any]) -> SurfaceField:
-    """The field at points of the body (..., 3), judged by its ``unit``."""
+    """Result from the field at points of the body (..., 3); ``unit`` as in `judged`."""
     values, lit, creeping = (one.reshape(points.shape[:-1]) for one in (field.values, field.wave, field.creeping))
     return SurfaceField(values=values, lit=lit, creeping=creeping, **stated([field], points, unit), **facts)
 
@@ -370,9 +370,9 @@ def scalar_on_body(field: PointValues, points: FloatArray, unit: float, facts: d
 def measured_field(
     values: ComplexArray, error: FloatArray, method: str, error_by: str = "extinction", lit: BoolArray | None = None
 ) -> PointValues:
-    """Field of currents (n, ...); where its error is not known nothing is but the size of the wave.
+    """Field of currents (n, ...); where its error is not known, it is UNRESOLVED with the bound 1.
 
-    On the body it is the lit side's part where that is ``lit`` (n,), else that of rays.
+    On the body, values are the lit side's part where ``lit`` (n,), elsewhere that of rays.
     """
     known = np.isfinite(error)
     status = np.where(known, FieldStatus.OK, FieldStatus.UNRESOLVED).astype(np.int64)

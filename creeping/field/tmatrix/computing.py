@@ -215,7 +215,7 @@ class Plan(NamedTuple):
 
 
 def plan_for(load: Load, kind: Boundary, order: int, parts: int = 1) -> Plan:
-    """What a T-matrix takes by what the equation does, of a body of so many parts that are images of each other."""
+    """Cost of a T-matrix from the load of the equation; ``parts`` of the body are images of each other."""
     nodes, c = load.nodes, 2 if kind.kind == "conductor" else 1
     n, waves = float(c * nodes), float(vector_count(order) if c == 2 else count(order))
     # values of all waves, waves at the nodes of a part, and the matrix itself
@@ -268,7 +268,7 @@ def _refuse(plan: Plan, what: str, seconds: float) -> None:
 
 
 def pays(body: Surface, wavenumbers: FloatArray, boundary: BoundaryLike, incidences: int) -> bool:
-    """Whether T-matrices take less time in all than the equations of so many incidences, which are not refused."""
+    """Whether T-matrices take less time than the equations of ``incidences``, if these are not refused."""
     left = 0.0
     for k in wavenumbers.tolist():
         equation, plan = plan_of(body, k, boundary, incidences=incidences), expected(body, k, boundary)
@@ -285,7 +285,7 @@ def known_t_matrix(body: Surface, wavenumber: float, boundary: BoundaryLike) -> 
 
 
 def kept_t_matrix(body: Surface, wavenumber: float, boundary: BoundaryLike, store: Path | None = None) -> TMatrix:
-    """The T-matrix of a body, made once while there is room for it."""
+    """The T-matrix of a body, cached while there is room for it."""
     known: dict[Any, TMatrix] = memo(body, "T-matrices", dict)
     key = wavenumber, boundary
     if key not in known:

@@ -177,7 +177,7 @@ def turn_blocks(rotation: FloatArray, order: int) -> list[ComplexArray]:
 
 
 def turned(T: ComplexArray, rotation: FloatArray, order: int, *, vector: bool) -> ComplexArray:
-    """The T-matrix of the body turned by a rotation (3, 3) about the centre."""
+    """The T-matrix of the body rotated by ``rotation`` (3, 3) about the centre."""
     n = count(order) - 1 if vector else count(order)
     D = np.zeros((n, n), dtype=complex)
     for deg, block in enumerate(turn_blocks(rotation, order)):

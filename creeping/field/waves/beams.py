@@ -194,7 +194,7 @@ def _counts(strip: Strip, length: float, wavenumber: float) -> tuple[int, int]:
 
 
 def seconds(fan: RayFan, strips: tuple[Strip, ...], wavenumber: float, count: int) -> float:
-    """About how long beams take at so many points."""
+    """Time of beams at ``count`` points, s, about."""
     sizes = [_counts(strip, fan.length, wavenumber) for strip in strips]
     # 20 ns for a block of a beam's steps at one point, 3 us to make a step
     summing = 2e-8 * count * sum(beams * (1 + steps / 16) for beams, steps in sizes)
@@ -271,7 +271,7 @@ def _beams_of(
 
 
 def variation(fan: RayFan, shed: ShedRays, y: ComplexArray, across: ComplexArray, wavenumber: float) -> FloatArray:
-    """Eta (m,) of waves y whose derivative in sigma is ``across`` (m,)."""
+    """eta (m,) of waves y whose derivative in sigma is ``across`` (m,)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         eta = (
             np.abs(across / (y * shed.rays.width)) ** 2 * beam_length(fan.body) / (2 * wavenumber * WIDTH * FACTORS[0])

@@ -58,12 +58,12 @@ APART = 2.0
 
 
 def fan_strips(fan: RayFan) -> tuple[Strip, ...]:
-    """Strips of a fan, made once, but those of a single ray, which have nothing to interpolate."""
+    """Strips of a fan, cached, without those of a single ray, which have nothing to interpolate."""
     return memo(fan, "strips", lambda: tuple(strip for strip in strips_of(fan) if len(strip.positions) > 1))
 
 
 def far_geometry(fan: RayFan, observation: ArrayLike) -> "FarGeometry":
-    """Geometry of a fan for directions (..., 3), kept with the fan until other directions are asked for."""
+    """Geometry of a fan for directions (..., 3), cached until other directions are asked for."""
     r = observers_of(observation)
 
     def make() -> FarGeometry:
@@ -107,7 +107,7 @@ def launched_by(fan: RayFan) -> LaunchPoints:
 
 
 def off_axis(directions: FloatArray, axis: FloatArray) -> FloatArray:
-    """Unit directions (m, 3), those nearer to the axis than 1e-6 turned away from it by that angle."""
+    """Unit directions (m, 3); those within 1e-6 rad of the axis are rotated to 1e-6 rad from it."""
     near = np.linalg.norm(directions - axis, axis=1) < 1e-6
     aside = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     turned = axis + 1e-6 * aside / np.linalg.norm(aside)
@@ -374,7 +374,7 @@ class FarGeometry:
         return free_ways(self.body, self.shed.rays)
 
     def normals_of(self, points: FloatArray) -> FloatArray:
-        """N at points (s, 3)."""
+        """Normals (s, 3) at points (s, 3), L."""
         return normal(self.body, points)
 
 

@@ -420,7 +420,7 @@ def sheets_of(geometry: FarGeometry, parts: list[Parts]) -> Sheets:
 
 
 def isolated(geometry: FarGeometry, parts: list[Parts]) -> BoolArray:
-    """Whether the field of each observer is that of its sheets, whatever the problem: no integral serves (m,)."""
+    """Whether the field of each observer is that of its sheets alone, without integrals, in all problems (m,)."""
     alone = np.ones(len(geometry.directions), dtype=bool)
     for one in parts:
         alone &= (one.in_forward == 0) & (one.in_fan == 0)

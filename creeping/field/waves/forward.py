@@ -36,7 +36,7 @@ def shadow_half(
     order: int,
     pole_share: FloatArray,
 ) -> ComplexArray:
-    """Integrand of I_S times its weight (n,), L; ``pole_share`` (n,) weights the term in c², 0 near d and 1 beyond."""
+    """Integrand of I_S times its weight (n,), L; ``pole_share`` (n,) weights g's term in c²: 0 near d, else 1."""
     rays = nodes.rays
     r, direction = observers[nodes.observer], direction[nodes.observer]
     xi = fock_parameter(rays, wavenumber)

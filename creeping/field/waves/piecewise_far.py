@@ -26,15 +26,15 @@ cast.
     f = -(ik/4π) ∫ [(1 + R) n.r + (1 - R) n.d] e^{ik(d - r).x} dS     over the lit side, R of a plane at its cos θᵢ =
     -n.d f = (ik/2π) [V - (V.r) r],  V = ∫ n e^{ik(d - r).x} dS x (d x E)   of a conductor
 
-On curved ground n.r is replaced by (2w - 1) n.d, w = 1 in the forward lobe and 0 elsewhere: they agree at specular
+On curved surfaces n.r is replaced by (2w - 1) n.d, w = 1 in the forward lobe and 0 elsewhere: they agree at specular
 points and ahead, and n.d has no jump at the shadow line, where the current of a hard body does not stop.
 
 Each tile is a flat triangle, over which the phase is linear: with phases u and v of two corners relative to the third,
 
     ∫ e^{iφ} dS = 2A e^{iφ0} (g(u) - g(v))/(i(u - v)),    g(x) = (e^{ix} - 1)/(ix)    (`kernels.bounce.triangle_waves`).
 
-The same integral serves a specular point, a flat facet as a whole, the rim of a facet and the forward lobe. Its error
-on curved ground is of the next order, κ/(k cos³θᵢ) of each tile's contribution.
+The same integral gives a specular point, a flat facet as a whole, the rim of a facet and the forward lobe. Its error
+on curved surfaces is of the next order, κ/(k cos³θᵢ) of each tile's contribution.
 
 Sources: [LK59], [KLS56]; [KLS56]; Derivations, F3 and F13.
 """
@@ -311,7 +311,7 @@ class LitTiles(NamedTuple):
 
 
 def side_of_tiles(body: Any, wavenumber: float) -> float:
-    """Share of the body's size that tiles may have as sides; one of few, so that frequencies share them."""
+    """Side of tiles over the body's size, rounded to a power of sqrt 2: frequencies share tiles."""
     shortest, longest = 2e-3, 0.1
     coarse = tiles_of(body, longest)
     bound = _curvatures(body, coarse, coarse.corners.mean(axis=1))

@@ -154,7 +154,7 @@ def judged_sum(
     wavenumber: float,
     boundary: Boundary,
 ) -> RaySum:
-    """A sum (n, ...) of waves of these sizes (m,), with what ends with the fan, and its status.
+    """Sum (n, ...) of waves of sizes (m,), with its status; the error includes what is beyond the fan.
 
     ``trouble`` says where rays have ended, and where they merge on a caustic: (n,), (n,).
     """
@@ -185,10 +185,10 @@ def own_error(
     height: FloatArray | None = None,
     mixed: FloatArray | None = None,
 ) -> FloatArray:
-    """Error of each ray's own wave (...), on the body or off it, from the wave in this and in the other order.
+    """Error (...) of each ray's wave, on the body or off it; ``waves`` are of this order and of the other one.
 
-    ``height`` (...) is Y of waves off the body. Waves may have components beyond the axes of the rays. ``mixed`` (...)
-    is the size of the wave from which torsion may bring some of it, which has a share in its error.
+    ``height`` (...) is Y of waves off the body. Waves may have a last axis of components. ``mixed`` (...) is |u| of
+    a conductor's ray, of which torsion may bring a part into this wave: that part counts as error.
     """
     size, of = magnitude(waves[0], rays.time), FACTORS[boundary.kind]
     # a wave may be infinite
@@ -216,7 +216,7 @@ def own_error(
 
 
 def magnitude(values: ComplexArray, like: Any) -> FloatArray:
-    """|values| of the shape of ``like``: over axes beyond it, components, the root of the sum of squares."""
+    """|values| in the shape of ``like``; a last axis beyond it is that of a vector's components."""
     size = np.abs(values)
     return np.asarray(size if size.ndim == np.ndim(like) else np.sqrt(np.sum(size**2, axis=-1)))
 
@@ -265,7 +265,7 @@ def merging_error(shed: ShedRays, size: FloatArray, wavenumber: float, count: in
 def merging_of(
     observer: IntArray, zeros: IntArray, length: FloatArray, size: FloatArray, wavenumber: float, count: int
 ) -> FloatArray:
-    """The same of waves in the order of their observers, with zeros of J passed and lengths of their ways (n,)."""
+    """`merging_error` of waves (n,) sorted by observer, with zeros of J passed and path lengths (n,), L."""
     parity, out, apart = zeros % 2, np.zeros(count), 1
     # pairs of one observer stand at most as far apart as it has rays
     while apart < len(observer):
@@ -303,7 +303,7 @@ def gradient_coupling(rays: RayPoints, wavenumber: float) -> ComplexArray:
 
 
 def held_coupling(coupling: ComplexArray) -> ComplexArray:
-    """The coupling c held below 1 in size, c/(1 + |c|⁴)^(1/4).
+    """The coupling c limited to size 1, c/(1 + |c|⁴)^(1/4).
 
     As the next order of a wave it cannot be larger than what it comes from.
     """

@@ -73,7 +73,7 @@ def reflection(
 def _flat_reflection(
     cosine: FloatArray, along: FloatArray, across: FloatArray, k: float, boundary: Boundary, order: int
 ) -> ComplexArray:
-    """R (n,) where P does not serve: on flat and concave surfaces, and far from grazing."""
+    """R (n,) where P is not valid: on flat and concave surfaces, and far from grazing."""
     first = plane_reflection(cosine, boundary)
     if order == 1:
         return first
@@ -126,7 +126,7 @@ def next_order(specular: SpecularPoints, wavenumber: float) -> FloatArray:
 
 
 def series_fails(specular: SpecularPoints, wavenumber: float, *, conductor: bool) -> BoolArray:
-    """Whether the next term is too large for a series (n,); a conductor's tells its polarisations apart too."""
+    """Whether the next term of a series is too large (n,), or that by which a conductor's polarisations differ."""
     size = np.abs(next_order(specular, wavenumber))
     if conductor:
         unlike = np.abs(specular.along - specular.across)

@@ -58,7 +58,7 @@ def smoothstep(x: FloatArray, start: float, end: float) -> FloatArray:
 
 
 def limited(change: ComplexArray, bound: ComplexArray | FloatArray | float) -> ComplexArray:
-    """A correction held below a bound in magnitude; below a third of it, untouched to 1e-2 of itself (...)."""
+    """A correction (...) limited to a bound in magnitude; below a third of it, changed by at most 1 %."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.nan_to_num(np.abs(change) / np.abs(bound), nan=0.0, posinf=1e30)
     return np.asarray(change / np.sqrt(np.sqrt(1 + ratio**4)))

@@ -62,12 +62,12 @@ from creeping.rays.quantities import RayPoints
 
 
 def scalar_boundary(boundary: BoundaryLike) -> Boundary:
-    """The scalar problem of a boundary.
+    """Boundary of the one scalar problem.
 
     Raises
     ------
     InvalidInputError
-        If it is unknown, or "pec", whose fields are vectors.
+        If the boundary is unknown, or "pec", whose fields are vectors.
     """
     kinds = scalar_boundaries(boundary)
     if len(kinds) > 1:

@@ -18,7 +18,7 @@ from creeping.kernels.block import strict_options as options
 
 @njit(**options)
 def move(level, level_par, waves, x, reach, steps, work, tangents, curvature, left):
-    """Move x (n, 3) onto the lines of waves (n, 4), or (1, 4) of one for all, by so many steps of at most ``reach``.
+    """Move x (n, 3) onto the lines of waves (n, 4), or (1, 4) of one for all, by ``steps`` steps of at most ``reach``.
 
     Fills, where the points are in the end, T (n, 3), kappa_n (n,) and the sizes (n,) of the steps that would follow,
     none of them finite where there is no step. Returns the largest size, inf if one is not finite. work (23, BLOCK)
