@@ -40,7 +40,7 @@ class BentEllipsoid(Levelled, SphereMapped, Body):
         return np.stack([-half, half])
 
     def parameters(self, points: FloatArray) -> FloatArray:
-        """Polar angle theta in [0, pi] and azimuth phi in (-pi, pi] of psi^-1(x), radians: (..., 3) -> (..., 2)."""
+        """Angles theta in [0, pi] and phi in (-pi, pi] of the unit vectors psi^-1(x), radians: (..., 3) to (..., 2)."""
         return polar_angles(self.inverse(points))
 
     def _compiled(self, source: Callable[..., None], kind: Kind) -> Compiled:
@@ -48,7 +48,7 @@ class BentEllipsoid(Levelled, SphereMapped, Body):
 
     @property
     def mirrors(self) -> bool:
-        """Whether the three coordinate planes are mirrors of the body and of its sphere map."""
+        """Whether the body and its sphere map psi are symmetric about all three coordinate planes."""
         return self._shape()[3] == 0.0
 
     @property
@@ -61,27 +61,27 @@ class BentEllipsoid(Levelled, SphereMapped, Body):
 
     @cached_property
     def compiled(self) -> Compiled:
-        """Compiled level evaluator."""
+        """Compiled function that gives F, its gradient and its Hessian."""
         return self._compiled(_evaluate, "level")
 
     @cached_property
     def compiled_forward(self) -> Compiled:
-        """Compiled psi and its derivative."""
+        """Compiled function that gives psi, from the unit sphere to the body, and its derivative."""
         return self._compiled(_forward, "forward")
 
     @cached_property
     def compiled_inverse(self) -> Compiled:
-        """Compiled psi^-1, normalised."""
+        """Compiled inverse of psi, which gives unit vectors."""
         return self._compiled(_inverse, "inverse")
 
     @cached
     def atlas(self) -> CubeSphereAtlas:
-        """Six charts."""
+        """Six charts that cover the body."""
         return CubeSphereAtlas(self, self._compiled(_locate, "locator"))
 
     @property
     def tiling(self) -> Sequence[FaceChart]:
-        """The six charts."""
+        """The six charts of `atlas`, whose unit squares cover the body once."""
         return self.atlas.charts
 
 
@@ -130,8 +130,8 @@ class Sphere(BentEllipsoid):
     radius : float
         L; positive.
     speed : str or object with ``value`` and ``gradient``, optional
-        Speed c(x) of the weighted flow; ``"1 + x"`` is an example of [YC06b]. On the unit sphere it
-        vanishes at (-1, 0, 0), which no ray reaches in finite time: ds/c is there the flat metric of a plane.
+        Speed c(x) of the weighted flow; ``"1 + x"`` is an example of [YC06b]. On the unit sphere
+        this speed vanishes at (-1, 0, 0), which no ray reaches in finite time; ds/c is then the metric of a plane.
 
     Raises
     ------
@@ -333,25 +333,25 @@ class Torus(Levelled, Body):
         return 0.0, 0.0, 1.0
 
     def parameters(self, points: FloatArray) -> FloatArray:
-        """Angles (theta, psi), radians, both in (-pi, pi]: points (..., 3), L, to (..., 2)."""
+        """Angle theta around the tube and azimuth psi, radians, both in (-pi, pi]: points (..., 3), L, to (..., 2)."""
         x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
         return np.stack([np.arctan2(z, np.hypot(x, y) - self.R), np.arctan2(y, x)], axis=-1)
 
     @cached_property
     def compiled(self) -> Compiled:
-        """Compiled level evaluator."""
+        """Compiled function that gives F, its gradient and its Hessian."""
         return Compiled(_torus_evaluate, "level", np.array([self.R, self.r]))
 
     @cached
     def atlas(self) -> PeriodicAtlas:
-        """One doubly periodic chart."""
+        """One chart that covers the torus, periodic in both coordinates."""
         radii = np.array([self.R, self.r])
         there, back = Compiled(_torus_forward, "forward", radii), Compiled(_torus_inverse, "inverse", radii)
         return PeriodicAtlas(Compiled(_torus_locate, "locator", radii), there, back)
 
     @property
     def tiling(self) -> Sequence[PeriodicChart]:
-        """The one chart."""
+        """The one chart of `atlas`, whose unit square covers the torus once."""
         return self.atlas.charts
 
 

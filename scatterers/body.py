@@ -236,7 +236,7 @@ class Levelled:
 
     @property
     def compiled(self) -> Compiled:
-        """Compiled level evaluator."""
+        """Compiled function that gives F, its gradient and its Hessian."""
         raise NotImplementedError
 
     @property
@@ -251,7 +251,7 @@ class Levelled:
     def gradient(self, points: FloatArray) -> FloatArray:
         """Gradient of F, unit of F over L: points (..., 3), L, to (..., 3).
 
-        At a tip it is finite, and that of no side.
+        At a tip it is finite, but is the gradient on none of the sides.
         """
         return evaluated(self.compiled, points)[1]
 
@@ -260,14 +260,14 @@ class Levelled:
         return evaluated(self.compiled, points)[2][..., SYMMETRIC]
 
     def jet(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """F, its gradient and its Hessian, by one evaluation: points (..., 3), L."""
+        """F, its gradient and its Hessian, by one evaluation: points (..., 3), L, to (...), (..., 3), (..., 3, 3)."""
         level, gradient, entries = evaluated(self.compiled, points)
         return level, gradient, entries[..., SYMMETRIC]
 
     def parameters(self, points: FloatArray) -> FloatArray:
         """Polar angle theta in [0, pi] and azimuth phi in (-pi, pi], radians: (..., 3) -> (..., 2).
 
-        Of the point as seen from the middle of the box, the box drawn as a cube.
+        They are the angles of each point as seen from the middle of the bounding box, with the box scaled to a cube.
         """
         low, high = self.bounds
         return polar_angles((np.asarray(points, dtype=float) - 0.5 * (low + high)) / (0.5 * (high - low)))
@@ -278,24 +278,24 @@ class SphereMapped:
 
     @property
     def compiled_forward(self) -> Compiled:
-        """Compiled psi and its derivative."""
+        """Compiled function that gives psi and its derivative."""
         raise NotImplementedError
 
     @property
     def compiled_inverse(self) -> Compiled:
-        """Compiled psi^-1, of unit length."""
+        """Compiled inverse of psi, which gives unit vectors."""
         raise NotImplementedError
 
     def forward(self, s: FloatArray) -> FloatArray:
-        """psi(s), L: unit vectors (..., 3) to (..., 3)."""
+        """Points psi(s) of the body, L, for unit vectors s: (..., 3) to (..., 3)."""
         return mapped(self.compiled_forward, s)[0]
 
     def derivative(self, s: FloatArray) -> FloatArray:
-        """Derivative of psi, L: unit vectors (..., 3) to (..., 3, 3)."""
+        """Derivative of psi, L, at unit vectors s: (..., 3) to (..., 3, 3)."""
         return mapped(self.compiled_forward, s)[1]
 
     def inverse(self, points: FloatArray) -> FloatArray:
-        """psi^-1(x), of unit length: points (..., 3), L, to (..., 3)."""
+        """Unit vectors s = psi^-1(x) of points x, L: (..., 3) to (..., 3)."""
         return inverted(self.compiled_inverse, points)
 
 
@@ -363,7 +363,7 @@ class Piece(Levelled):
 
     @property
     def compiled(self) -> Compiled:
-        """Compiled level evaluator."""
+        """Compiled function that gives F, its gradient and its Hessian."""
         return self._compiled
 
     @property

@@ -47,7 +47,7 @@ class Cad(FittedBody):
     surface : {"smooth", "facets", "auto"}
         "facets" returns `Facets` of the same source; "auto" does so if no smooth surface fits.
     cache : bool or path
-        True stores the fit in the cache folder of the user, a path in that folder; False does not store it.
+        True stores the fit in the cache folder of the user; a path stores it in that folder; False does not store it.
     speed : str or object with ``value`` and ``gradient``, optional
         Speed c(x) of the weighted flow.
     progress : callable or bool, optional
@@ -56,7 +56,7 @@ class Cad(FittedBody):
     Attributes
     ----------
     quality : MeshQuality
-        Of the points.
+        Quality of the surface points that were fitted.
     fit : FitReport
     coarse_fit : SplineBody
         The same body fitted on a coarser grid; the difference shows the uncertainty of the shape.

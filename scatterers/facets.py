@@ -96,7 +96,7 @@ class Facets(Shown):
 
     @cached_property
     def fingerprint(self) -> str:
-        """Text that tells bodies apart, their sizes and places too."""
+        """Text that identifies the triangles, with their size and position."""
         digest = hashlib.blake2b(self.vertices.tobytes(), digest_size=16)
         digest.update(self.triangles.tobytes())
         return f"Facets:{digest.hexdigest()}"
@@ -217,7 +217,7 @@ class Bodies(Shown):
         return f"Bodies({len(self.parts)}: {', '.join(type(part).__name__ for part in self.parts[:6])})"
 
     def own(self, number: int, points: FloatArray) -> FloatArray:
-        """Points (m, 3), L, in the coordinates of one body: (m, 3), L."""
+        """Points (m, 3), L, converted to the coordinates of the body with the given number: (m, 3), L."""
         return np.asarray((points - self.shifts[number]) @ self.turns[number])
 
     def inside(self, points: FloatArray) -> BoolArray:

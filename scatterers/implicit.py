@@ -49,8 +49,8 @@ class Implicit(LevelBody):
     ----------
     expression : str
         Numbers, x, y, z, pi, + - * / **, parentheses, sqrt, exp, log, sin, cos, tan, sinh, cosh, tanh, and
-        max(a, b, ...), min(a, b, ...) and where(x < 0, a, b); negative inside the body, positive outside. Of an
-        equation, ``"x**2 + y**2 = 1 - z**2"``, the left side less the right.
+        max(a, b, ...), min(a, b, ...) and where(x < 0, a, b); negative inside the body, positive outside. An
+        equation such as ``"x**2 + y**2 = 1 - z**2"`` stands for its left side minus its right side.
     bounds : (2, 3) array_like, optional
         Box that contains the body and nothing else, L; found if not given, for bodies that a cube about the origin with
         half width 2^-8 to 2^12 resolves.
@@ -67,7 +67,7 @@ class Implicit(LevelBody):
     ------
     ValueError
         If the expression contains anything else, or F = 0 is empty, open, unbounded, not finite, not connected, has a
-        cavity, crosses itself, or has unbounded curvature other than at tips; or is refused as strict.
+        cavity, crosses itself, or has unbounded curvature other than at tips; or if ``strict`` refuses the body.
 
     Examples
     --------
@@ -266,7 +266,7 @@ class Gridded(LevelBody):
         Box spanned by the grid, L; the outermost nodes lie on its faces.
     centre : (3,) array_like, optional
         Interior point from which the whole surface is visible, L; by default the centre of the bounding box. A bent
-        body is sheared straight first where that makes it star-shaped; others need no centre.
+        body is first sheared straight if that makes it star-shaped. Bodies that are not star-shaped take none.
     speed : str or object with ``value`` and ``gradient``, optional
         Speed c(x) of the weighted flow.
 

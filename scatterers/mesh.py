@@ -60,7 +60,7 @@ class Mesh(FittedBody):
     surface : {"smooth", "facets", "auto"}
         "facets" returns `Facets` of the same source; "auto" does so if no smooth surface fits.
     cache : bool or path
-        True stores the fit in the cache folder of the user, a path in that folder; False does not store it.
+        True stores the fit in the cache folder of the user; a path stores it in that folder; False does not store it.
     speed : str or object with ``value`` and ``gradient``, optional
         Speed c(x) of the weighted flow.
     progress : callable or bool, optional
@@ -228,8 +228,8 @@ def examined_mesh(
     Raises
     ------
     ValueError
-        If the source is not one closed body, or is to be subdivided a number of times though it has edges or joints,
-        or to more vertices than are allowed.
+        If the source is not one closed body, or if ``subdivide`` is a number and the mesh has edges or joints or
+        would get more vertices than are allowed.
 
     Examples
     --------

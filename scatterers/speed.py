@@ -57,7 +57,7 @@ class ExpressionSpeed:
 
     @property
     def fingerprint(self) -> str:
-        """Text that changes with the speed."""
+        """Text that identifies the speed."""
         return repr(self.expression)
 
     @property
@@ -136,7 +136,7 @@ class Coating:
 
     @property
     def fingerprint(self) -> str:
-        """Text that changes with the admittance."""
+        """Text that identifies the admittance."""
         return self.real if self.imaginary == "0" else f"{self.real} + 1j*({self.imaginary})"
 
     def value(self, points: FloatArray) -> ComplexArray:

@@ -289,7 +289,8 @@ class DoubleOgive(Revolved):
     lower, upper : float
         Lengths below and above z = 0, L; more than the radius.
     lower_angle, upper_angle : float, optional
-        Angles alpha of the published formula, radians, below pi/2; those of circles if not given.
+        Angles alpha of the EMCC profile r = radius (sqrt(1 - (z sin(alpha)/length)^2) - cos(alpha))/(1 - cos(alpha)),
+        radians, below pi/2; by default the profile is a circular arc.
     speed : str or object with ``value`` and ``gradient``, optional
         Speed c(x) of the weighted flow.
 
@@ -356,8 +357,8 @@ def _ellipse(radius: float, length: float, angle: float | None) -> tuple[Pair, P
 class Almond(Revolved):
     """The NASA almond along the x axis, its tip towards +x; widest in the plane x = 0, along y.
 
-    Two pieces: 0 is half an ellipsoid, x < 0. They meet in a joint; the curvature is continuous there, its second
-    derivative is not.
+    The body has two pieces; piece 0, at x < 0, is half an ellipsoid. They meet in a joint, across which the curvature
+    is continuous and its second derivative is not.
 
     Parameters
     ----------

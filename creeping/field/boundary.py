@@ -91,8 +91,9 @@ class ImpedanceBoundary:
     admittance : complex or callable
         Relative admittance eta, without unit: 0 is hard, the limit of infinity is soft, 1 absorbs at normal incidence.
         A real part >= 0 makes the boundary passive. An admittance that varies smoothly over the body is a function of
-        points (n, 3), L, or an object with such a method ``value``, e.g. ``scatterers.Coating("0.3 + 0.1*z")``. It has
-        no creeping modes: use fields at points, `far_field` with currents, or the integral equation.
+        points (n, 3), L, or an object with such a method ``value``, e.g. ``scatterers.Coating("0.3 + 0.1*z")``. A
+        varying admittance has no creeping modes: use fields at points, `far_field` with currents, or the integral
+        equation.
 
     Raises
     ------

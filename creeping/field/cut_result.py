@@ -252,11 +252,11 @@ def field_cut(
         Grid spacing; by default an eighth of a wavelength. It grows to at most a fifth of a wavelength if `near_field`
         would otherwise find currents too expensive, and further if the grid would exceed 60 000 points.
     order, method
-        Of a fan, as for `near_field`; for a conductor 2, and "auto" or "equation".
+        For a fan, as for `near_field`; on a conductor order 2, and method "auto" or "equation".
     polarisation : "theta", "phi" or (3,) complex, optional
         Polarisation of the incident wave, for a conductor; by default "theta".
     incidence : int
-        Of a solution, the number of the direction of incidence.
+        For a solution, the number of the incidence, from 0.
 
     Returns
     -------

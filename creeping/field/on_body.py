@@ -88,13 +88,13 @@ def surface_field(
     Returns
     -------
     SurfaceField
-        Usable as the array of its values. Without points, of shape (rays, steps): the contribution of each ray alone.
-        Creeping modes give it up to detachment and marching beyond; the fan of a point source, whose incident wave is
-        e^{ikR}/(4 pi R), has modes only. It is infinite at caustics of the ray (status CAUSTIC), and 0 after the ray
-        has ended (DETACHED) or if the wave did not launch the ray (NO_RAY). With points (...): the total field. In
-        the shadow it is the sum over all rays through a point, or 0 if no ray passes (NO_RAY or TRUNCATED). Waves are
-        marched, with beams where rays merge, and so continue across caustics and beyond detachment; creeping modes
-        are used where marching is impossible or takes more than a minute, and for order 1 (``method``).
+        Usable as the array of its values. Without points, (rays, steps): the contribution of each ray alone. It is
+        computed by creeping modes up to detachment and by marching beyond; for the fan of a point source, whose
+        incident wave is e^{ikR}/(4 pi R), by modes only. It is infinite at caustics of the ray (status CAUSTIC), and 0
+        after the ray has ended (DETACHED) or if the wave did not launch the ray (NO_RAY). With points (...): the total
+        field. In the shadow this is the sum over all rays through a point, or 0 if no ray passes (NO_RAY or
+        TRUNCATED). Waves are marched, with beams where rays merge, so that they continue across caustics and beyond
+        detachment. Creeping modes replace marching where it is impossible or takes more than a minute, and for order 1.
 
     Raises
     ------

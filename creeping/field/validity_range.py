@@ -40,6 +40,8 @@ WITHIN, EDGE = (10.0, 1.0), (4.0, 2.0)
 class Validity(NamedTuple):
     """Least k rho and largest |kappa_t| rho/m^2 on the rays of a fan, without unit; NaN if there are no rays.
 
+    rho = 1/kappa_n; kappa_n and kappa_t are the normal curvatures along and across the ray; m = (k rho/2)^(1/3).
+
     Examples
     --------
     >>> Validity(24.0, 0.8)
@@ -51,7 +53,10 @@ class Validity(NamedTuple):
 
 
 def validity(fan: RayFan, *, wavenumber: float) -> Validity:
-    """Least k rho and largest kappa_t rho/m^2 on the rays of a fan.
+    """Least k rho and largest |kappa_t| rho/m^2 on the rays of a fan.
+
+    rho = 1/kappa_n; kappa_n and kappa_t are the normal curvatures along and across the ray; m = (k rho/2)^(1/3).
+    The expansions need a large k rho and a small kappa_t rho/m^2.
 
     Parameters
     ----------

@@ -53,14 +53,14 @@ def write_mat(
     result : Echo, FarField, FieldCut, ShadowLine, RayFan or sequence of IsoPhaseCurve
         Arrays keep their axes: channels, angles, frequencies of an echo; directions, scattered and incident θ̂ and φ̂
         of a far field; ``up`` and ``across`` of a field on a plane, NaN and status -1 inside the body; rays and steps
-        of a fan. A line and iso-phase curves are one point a row, with the number of its curve.
+        of a fan. A shadow line and iso-phase curves have one row per point, with the number of its curve.
     observed : (texts, angles), optional
-        Of a far field: what each direction was asked for as, and its angle along the cut (m,), degrees.
+        For a far field: each direction as text, as the user gave it, and its angle along the cut (m,), degrees.
 
     Raises
     ------
     InvalidInputError
-        If the result is none of these.
+        If the result is of another type.
     CreepingError
         If the file cannot be written.
 
@@ -225,13 +225,13 @@ def polydata(line: ShadowLine | None = None, fan: RayFan | None = None, curves: 
 
     Parameters
     ----------
-    line, fan, curves
-        What to collect; leave out what is not wanted.
+    line, fan, curves : ShadowLine, RayFan and sequence of IsoPhaseCurve, optional
+        Results to include.
 
     Returns
     -------
     pyvista.PolyData
-        Copies: what is done to it leaves the results alone.
+        Its arrays are copies: changes do not affect the results.
     """
     import pyvista
 
@@ -273,15 +273,16 @@ def write_vtp(
 
     One polyline per curve of the shadow line, ray and iso-phase curve. Point arrays: travel_time, eikonal, spreading,
     spreading_rate, curvature, attenuation, caustic_index, line_status (0 attached, 1 occluded, 2 concave), ray_status
-    (the ray's, from where it applies). Cell arrays: kind (0 shadow line, 1 ray, 2 iso-phase curve), ray (its number),
-    status (`RayStatus`), curve_index, level. Where an array does not apply it is NaN, or -1 if of integers.
+    (OK up to the point where the ray ends, then its status). Cell arrays: kind (0 shadow line, 1 ray, 2 iso-phase
+    curve), ray (its number), status (`RayStatus`), curve_index, level. Where an array does not apply, it is NaN, or -1
+    if it holds integers.
 
     Parameters
     ----------
     path : str or path
         File to write; replaced at once when complete.
-    line, fan, curves
-        What to write; leave out what is not wanted.
+    line, fan, curves : ShadowLine, RayFan and sequence of IsoPhaseCurve, optional
+        Results to write.
 
     Raises
     ------

@@ -166,13 +166,13 @@ class FfeBlock:
     Attributes
     ----------
     name : str
-        Of the configuration.
+        Name of the FEKO configuration.
     frequency : float, Hz
     theta, phi : (n,), degrees
     field : (n, 2) complex
         Along θ̂ and φ̂ of each row's own angles, time factor e^{-iωt}: f in metres if 1 V/m is incident, else rE in V.
     keys : dict
-        What else the file says of the block.
+        Entries of the block's header, as text by name.
     """
 
     name: str
@@ -184,17 +184,17 @@ class FfeBlock:
 
     @property
     def directions(self) -> FloatArray:
-        """Unit directions (n, 3)."""
+        """Unit vectors (n, 3) of ``theta`` and ``phi``."""
         return directions_from_angles(np.radians(self.theta), np.radians(self.phi))
 
     @property
     def wavenumber(self) -> float:
-        """k, 1/m, of light."""
+        """Wavenumber k of an electromagnetic wave of this frequency, 1/m."""
         return float(wavenumber(self.frequency))
 
     @property
     def incidence(self) -> tuple[float, float] | None:
-        """Where the incident wave comes from: theta and phi, degrees; None if the file does not say."""
+        """Direction from which the incident wave comes: theta and phi, degrees; None if the file does not give it."""
         numbers = _NUMBER.findall(self.keys.get("Incident Wave Direction", ""))
         return (float(numbers[0]), float(numbers[1])) if len(numbers) == 2 else None
 
@@ -224,7 +224,7 @@ def read_ffe(path: str | os.PathLike[str]) -> tuple[FfeBlock, ...]:
     Raises
     ------
     InvalidInputError
-        If it is no such file, or damaged; with the number of the line.
+        If the file is not a FEKO far-field file or is damaged; the message gives the number of the line.
 
     Examples
     --------

@@ -31,19 +31,19 @@ _POLARISATION = re.compile(r"(?<![a-z])(hh|vv|hv|vh)(?![a-z])")
 
 @dataclass(frozen=True, eq=False)
 class MeasuredCut:
-    """Levels by column.
+    """Measured or published levels over an angle or over frequency, an array for each column of the file.
 
     Attributes
     ----------
     name : str
-        Of the file.
+        Name of the file.
     over : {"angle", "frequency"}
     values : (m,)
         Angles, degrees, or frequencies, Hz, ascending.
     levels : dict of str to (m,), dB
-        By the name of the column; NaN where there is no number.
+        Levels by name of the column; NaN where the file has no number.
     polar : bool
-        Whether the column's name says that its angles are polar or of elevation, which do not repeat after a turn.
+        Whether the angles are polar angles or elevations, by the name of their column; these have no period of 360.
     """
 
     name: str
@@ -53,7 +53,7 @@ class MeasuredCut:
     polar: bool = False
 
     def of(self, channel: str) -> FloatArray | None:
-        """Levels (m,) of a polarisation or boundary, or of the only column; None if there is none."""
+        """Levels (m,), dB, of a polarisation or boundary, or of the only column; None if there is no such column."""
         for name, levels in self.levels.items():
             found = _POLARISATION.search(name.lower())
             if name.lower() == channel.lower() or (found and found[1] == channel.lower()):
@@ -63,17 +63,17 @@ class MeasuredCut:
 
 
 def read_cut(path: str | os.PathLike[str]) -> MeasuredCut:
-    """Read a cut.
+    """Read measured or published levels from a table in a text file.
 
     Parameters
     ----------
     path : str or path
-        Text with one row for each angle or frequency. Columns of areas ("sigma (m2)") are turned into decibels.
+        Text with one row for each angle or frequency. Columns of areas ("sigma (m2)") are converted to decibels.
 
     Raises
     ------
     InvalidInputError
-        If it is no such table, with the columns that were found; or if it is too large, with the number of the line.
+        If the file holds no such table, or is too large; the message gives the columns found, or the line number.
     """
     file = Path(path)
     header, numbers = _table(file)

@@ -98,25 +98,26 @@ def write_touchstone(
 ) -> None:
     """Write couplings of the same ports at ascending wavenumbers as Touchstone, version 1.
 
-    Point sources on a hard body give S parameters, monopoles Z and slots Y parameters, none of them a diagonal.
+    Point sources on a hard body give S parameters, monopoles Z and slots Y parameters. Diagonal entries are written as
+    0, because they are not known.
 
     Parameters
     ----------
     path : str or path
-        File to write, by custom of suffix .sNp for N ports; replaced at once when complete.
+        File to write, usually with suffix .sNp for N ports; replaced at once when complete.
     couplings : sequence of Coupling
         One for each wavenumber.
     reference_distance : float, L
-        r0 of the transfer ratio; of monopoles their height, of slots their length.
+        Distance r0 of the transfer ratio 2 pi r0 u for points; height of monopoles; length of slots.
     sound_speed : float, optional, m/s
-        For the frequency of a wavenumber; that of light if not given.
+        Speed that converts wavenumbers to frequencies; by default that of light.
     names : sequence of str
-        Of the ports, for comments.
+        Names of the ports, written in comments.
 
     Raises
     ------
     InvalidInputError
-        If couplings are of slots and monopoles together, of different ports or not in order.
+        If couplings mix slots and monopoles, differ in ports, or are not in ascending order of wavenumber.
     CreepingError
         If the file cannot be written.
     """
@@ -169,16 +170,16 @@ def write_stk(path: str | os.PathLike[str], echo: Echo, channel: str, frequency:
     path : str or path
         File to write; replaced at once when complete.
     echo : Echo
-        Of radar cross sections; its directions are all pairs of two or more azimuths and two or more elevations.
+        Monostatic radar cross sections; directions are all pairs of two or more azimuths and elevations.
     channel : str
-        One of the echo's.
+        Name of one of the echo's channels.
     frequency : int
-        Its number among those of the echo.
+        Number of the frequency, from 0, among those of the echo.
 
     Raises
     ------
     InvalidInputError
-        If the echo is none of these, or a level is not finite.
+        If the echo, the channel or the frequency is not as described, or a level is not finite.
     CreepingError
         If the file cannot be written.
     """
@@ -219,7 +220,7 @@ def write_sofa(
     convention: str = "auto",
     title: str = "",
 ) -> None:
-    """Write what receivers on a body or near it get from far sources, over frequency, as a SOFA file.
+    """Write transfer functions from far sources to receivers on a body or near it, over frequency, as a SOFA file.
 
     Parameters
     ----------
@@ -232,16 +233,16 @@ def write_sofa(
     unit_length : float, m
         Length of the body's unit L; 1 for bodies in metres.
     convention : {"auto", "SimpleFreeFieldHRTF", "GeneralTF"}
-        By default that of heads for two receivers, the left one (of larger y) first, and the general one for other
-        numbers of them.
+        "auto" uses the convention of heads for two receivers, of which the left one (of larger y) comes first, and
+        the general one otherwise.
     title : str
-        Of the file; the name of the body, say.
+        Title of the file, e.g. the name of the body.
 
     Raises
     ------
     InvalidInputError
-        If patterns are of different directions, sources or boundaries or not in order, on a bad speed, unit,
-        suffix or convention, and for ears that are not left and right.
+        If patterns differ in directions, sources or boundary, or are not in order; on a bad speed, unit, suffix or
+        convention; if two ears are not one left and one right.
     CreepingError
         If the library sofar is missing, or the file cannot be written.
 

@@ -65,16 +65,16 @@ def write_csv(
     path : str or path
         File to write; replaced at once when complete.
     line, fan, curves, far, cut
-        Exactly one of them: they have different columns.
+        The result to write. Give exactly one; each kind has its own columns.
     observed : (texts, angles), optional
-        Of a far field: what each direction was asked for as, and its angle along the cut (m,), degrees.
+        For a far field: each direction as text, as the user gave it, and its angle along the cut (m,), degrees.
     mark : str
-        What the first line says of rows that are missing.
+        Note on missing rows, written as the first line; none if empty.
 
     Raises
     ------
     InvalidInputError
-        If not exactly one is given.
+        If not exactly one result is given.
     CreepingError
         If the file cannot be written.
     """
@@ -257,9 +257,9 @@ def write_echo(path: str | os.PathLike[str], echo: "Echo", *, known: BoolArray |
     path : str or path
     echo : Echo
     known : (n, k) of bool, optional
-        Angles and wavenumbers whose rows are written.
+        Angles and wavenumbers whose rows are written; by default all.
     mark : str
-        What the first line says of rows that are missing.
+        Note on missing rows, written as the first line; none if empty.
 
     Raises
     ------
@@ -295,7 +295,7 @@ def write_echo(path: str | os.PathLike[str], echo: "Echo", *, known: BoolArray |
 
 
 def write_profile(path: str | os.PathLike[str], profiles: "dict[str, RangeProfile]", echo: "Echo") -> None:
-    """Write range profiles by channel as CSV.
+    """Write the range profiles of an echo, a dict by channel, as CSV, a row for each channel and range.
 
     Raises
     ------
@@ -327,9 +327,9 @@ def write_couplings(
     path : str or path
     couplings : sequence of n Coupling
     names : sequence of str
-        Of the ports.
+        Names of the ports.
     hertz : (n,), Hz, optional
-        Frequencies; wavenumbers are written if there are none.
+        Frequencies; without them, wavenumbers are written.
 
     Raises
     ------
@@ -355,7 +355,9 @@ def write_couplings(
 def write_paths(
     path: str | os.PathLike[str], couplings: "Sequence[Coupling]", names: Sequence[str], hertz: FloatArray | None = None
 ) -> None:
-    """Write the geodesics between named ports as CSV, a row for each geodesic and frequency; arguments as above.
+    """Write the geodesics between named ports as CSV, a row for each geodesic and frequency.
+
+    Parameters are those of `write_couplings`.
 
     Raises
     ------
@@ -394,7 +396,7 @@ def _wave_column(couplings: "Sequence[Coupling]", hertz: FloatArray | None, rows
 def write_averages(
     path: str | os.PathLike[str], quantity: str, hertz: FloatArray, averages: "xarray.Dataset", *, mark: str = ""
 ) -> None:
-    """Write means over orientation as CSV, a row for each frequency.
+    """Write cross sections and levels averaged over orientation as CSV, a row for each frequency.
 
     Parameters
     ----------
@@ -402,9 +404,9 @@ def write_averages(
     quantity : {"rcs", "ts"}
     hertz : (k,), Hz
     averages : xarray.Dataset
-        Of `creeping.orientation_averages`, in metres.
+        Result of `creeping.orientation_averages` for a body in metres.
     mark : str
-        What the first line says of rows that are missing.
+        Note on missing rows, written as the first line; none if empty.
 
     Raises
     ------
@@ -424,7 +426,7 @@ def write_averages(
 
 
 def averaged_levels(quantity: str, averages: "xarray.Dataset") -> FloatArray:
-    """Levels (k,), dBsm or dB re 1 m, of means over orientation."""
+    """Levels (k,) of the backscattering averaged over orientation: "rcs" in dBsm, "ts" in dB re 1 m."""
     if quantity == "ts":
         return np.asarray(averages.target_strength.values)
     return np.asarray(10 * np.log10(averages.backscattering.values))

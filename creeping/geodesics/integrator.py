@@ -35,7 +35,7 @@ class ErrorEstimate:
     rms, max : float
         Of |(x, p) - (x, p)_traced|, the norm in R^6, over the samples.
     samples : int
-        Random points of T1Q.
+        Number of samples (x, p): random points with random unit tangents, or rays of a fan.
 
     Examples
     --------

@@ -72,7 +72,7 @@ class PointSource:
     Parameters
     ----------
     position : (3,), L
-        Outside the body, off it.
+        Outside the body, not on it.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class PointSource:
         object.__setattr__(self, "position", (x, y, z))
 
     def row(self, body: Surface | None = None) -> FloatArray:
-        """Homogeneous coordinates (d, w) of the source for the compiled kernels, |q| about 1 on the body: (4,)."""
+        """Homogeneous coordinates (d, w) of the source for compiled kernels, |d + w x| about 1 on the body: (4,)."""
         x = np.array(self.position)
         if body is None:
             return np.array([*-x, 1.0])

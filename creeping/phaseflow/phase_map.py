@@ -100,7 +100,7 @@ class PhaseMap(Drawn):
     ----------
     body : Surface
     model : Model
-        Coordinates in which maps are composed, and the simple motion that they are stored relative to.
+        Coordinates in which maps are composed, and a simple reference motion, relative to which maps are stored.
     grid : Grid
     leaps : tuple of Leap
         Maps by ascending time; the last is g_T0. Only ``method="tower"`` has more than one.
@@ -137,12 +137,12 @@ class PhaseMap(Drawn):
 
     @property
     def nbytes(self) -> int:
-        """Memory of the splines, bytes."""
+        """Memory that the splines take, bytes."""
         return sum(leap.nbytes for leap in self.leaps)
 
     @cached_property
     def digest(self) -> str:
-        """Digest of the tables, cached: the tables are not to be changed."""
+        """Hash of the tables, hexadecimal. It is cached, so do not change the tables."""
         tables = hashlib.blake2b(digest_size=16)
         for leap in self.leaps:
             for array in (leap.state, leap.centre, leap.jacobi, leap.matrix, leap.curvature, leap.flagged):

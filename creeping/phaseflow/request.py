@@ -96,7 +96,7 @@ def build_phase_map(
     carry_jacobi : bool
         Whether to carry the Jacobi matrix, which fans need.
     method : {"direct", "tower"}
-        "tower" is Algorithm 1 of the paper. It needs ``time_step``, ``stages``, ``horizon`` and ``grid``, and stores
+        "tower" is Algorithm 1 of [YC06a]. It needs ``time_step``, ``stages``, ``horizon`` and ``grid``, and stores
         (x, p) as Cartesian vectors, as in the paper.
     time_step : float, optional
         Time step tau of the initial map, for "tower".

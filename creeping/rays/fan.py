@@ -141,7 +141,7 @@ class RayFan(DrawnOnBody):
 
     @cached_property
     def crossings(self) -> Passages:
-        """Where rays go on across joints of a body with creases: ray, travel time and crease, each (n,)."""
+        """Crossings of joints by rays on a piecewise smooth body: ray number, travel time, crease number, (n,) each."""
         starts = pack(self.points[:, 0], self.directions[:, 0])
         return passages(self.body, starts, self.length, rtol=getattr(self.flow, "rtol", 1e-10))
 
@@ -149,7 +149,8 @@ class RayFan(DrawnOnBody):
     def least_radius(self) -> float:
         """Least 1/kappa_n, L, on the first part of the rays; NaN without rays, or for a weighted body.
 
-        The first part is that with xi < 1, at the wavenumber for which k rho is 10 at the median of the launch points.
+        The first part ends where the Fock parameter is 1, for the wavenumber k at which the median of k/kappa_n over
+        the launch points is 10.
         """
         if speed_of(self.body) is not None or not np.any(self.launched):
             return float("nan")
@@ -159,7 +160,7 @@ class RayFan(DrawnOnBody):
         return 1 / largest if largest > 0 else float("nan")
 
     def losses(self, wavenumber: float | None = None) -> Losses:
-        """Shares of shadow line, rays and outline lost to edges and tips; ``wavenumber`` is that of `launch`."""
+        """Shares of shadow line, rays and silhouette that edges and tips take; ``wavenumber`` is that of `launch`."""
         launched, lost = self.launched, 0.0
         ended = launched & np.isin(self.status, AT_CREASES)
         if np.any(ended):
@@ -218,8 +219,8 @@ def launch(
         and concave points too, as in Figure 6 of Ying and Candes 2006.
     max_gap : float, optional
         Rays are inserted until neighbours stay closer than this, L. By default 0.1 body sizes; inf inserts none.
-        Insertion stops at 32 times as many rays or, next to edges, at a 16th of a gap; `RayFan.largest_gap` gives the
-        gap that remains.
+        Insertion stops at 32 times as many rays; on a body with edges, spacings are halved at most four times.
+        `RayFan.largest_gap` gives the gap that remains.
     measured : bool
         Whether to measure the error at the end of the rays.
 

@@ -39,7 +39,8 @@ class IsoPhaseCurve(DrawnOnBody):
 
     Attributes
     ----------
-    level : float
+    level : float, L (time for a weighted body)
+        Value of the travel time or the eikonal on the curve.
     of : {"travel_time", "eikonal"}
     points : (m, 3), L
         In the order of the rays.
@@ -74,7 +75,7 @@ class IsoPhaseCurve(DrawnOnBody):
 
     @property
     def parameter_pieces(self) -> list[FloatArray]:
-        """The curve in the parameter plane, split where an angle jumps across its seam at +-pi: list of (k, 2)."""
+        """The curve in the parameter plane, split where an angle jumps between pi and -pi: list of (k, 2), radians."""
         return split_at_seam(self.parameters, closed=self.closed)
 
     @property

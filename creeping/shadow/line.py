@@ -110,7 +110,7 @@ class ShadowLine(DrawnOnBody):
 
     @property
     def fractions(self) -> dict[str, float]:
-        """Share of the length of all curves, by status."""
+        """Shares of the length of all curves that are attached, occluded and concave, by name."""
         length = sum(curve.length for curve in self.curves) or 1.0
         return {
             status: sum(curve.fractions[status] * curve.length for curve in self.curves) / length for status in STATUSES
@@ -129,7 +129,7 @@ class ShadowLine(DrawnOnBody):
         ]
 
     def launch_points(self, n_rays: int, launch_from: str = "attached") -> LaunchPoints:
-        """The given number of launch points on the arcs, in the form that `shadow_lines` returns for one incidence."""
+        """Launch points, ``n_rays`` in total, on the arcs, as `shadow_lines` returns them for one incidence."""
         checked_launch_from(launch_from)
         n_rays = whole_number(n_rays, "n_rays", 0)
         within_budget(400.0 * n_rays, f"{n_rays} rays", "ask for fewer")

@@ -67,7 +67,7 @@ def t_matrices(
     Returns
     -------
     iterator of TMatrix
-        In the order of the wavenumbers. One matrix is in memory at a time, on a cluster those that are done.
+        In the order of the wavenumbers. One matrix is in memory at a time; with a cluster, all that are finished.
 
     Raises
     ------

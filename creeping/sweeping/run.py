@@ -71,8 +71,8 @@ def sweep_directions(
         Wavenumbers of the fields.
     quantity : {"monostatic", "bistatic", "rays"}
         "monostatic": field back towards the source. "bistatic": field in the directions ``observation``. "rays": the
-        rays themselves. All results include data of the shadow line: curves, length, shares; NaN where no rays are
-        launched, as by the T-matrix, or where only the equation is valid on a body with edges.
+        rays themselves. All results include data of the shadow line: curves, length, shares. These are NaN where no
+        rays are launched: with the T-matrix, or on a body with edges where only the equation is valid.
     observation : (m, 3), optional
         Directions of observation for "bistatic".
     boundary : {"soft", "hard", "pec"}, ImpedanceBoundary or a list of them
@@ -114,8 +114,8 @@ def sweep_directions(
     Returns
     -------
     xarray.Dataset
-        ``incidence_status`` marks incidences that are singular or failed; these raise no error. Fields of singular
-        ones are those of the equation, NaN by rays alone or where it costs too much.
+        ``incidence_status`` marks incidences that are singular or failed; these raise no error. For singular
+        incidences the integral equation gives the fields; they are NaN if only rays are allowed or it costs too much.
 
     Raises
     ------

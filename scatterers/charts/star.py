@@ -391,27 +391,27 @@ class LevelBody(Levelled, Body):
 
     @property
     def star_shaped(self) -> bool:
-        """Whether the body has a sphere map."""
+        """Whether the body has a sphere map psi, which takes the unit sphere one-to-one to the body."""
         return self._map is not None
 
     def parameters(self, points: FloatArray) -> FloatArray:
         """Polar angle theta in [0, pi] and azimuth phi in (-pi, pi], radians: (..., 3) -> (..., 2).
 
-        Of psi^-1(x) on a star-shaped body; else of x as seen from the middle of the box, where several points of the
-        body may share their angles.
+        On a star-shaped body they are the angles of the unit vector that the sphere map takes to the point. On other
+        bodies they are those of the point seen from the middle of the box; several points may share their angles.
         """
         return polar_angles(self._map.inverse(points) if self._map is not None else points - self._bounds.mean(0))
 
     @cached_property
     def compiled(self) -> Compiled:
-        """Compiled level evaluator."""
+        """Compiled function that gives F, its gradient and its Hessian."""
         if self._map is not None:
             return self._map.compiled_level
         return Compiled(self._space.sources["level"], "level", self._space.flat(np.zeros(AT.end - AT.centre)))
 
     @cached
     def atlas(self) -> "CubeSphereAtlas | MongeAtlas":
-        """Six charts over the sphere map, or Monge charts.
+        """Charts that cover the body: six by the sphere map of a star-shaped body, else Monge charts.
 
         Raises
         ------

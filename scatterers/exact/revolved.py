@@ -127,7 +127,7 @@ class Revolved(Levelled, Body):
 
     @cached
     def pieces(self) -> Sequence[Piece]:
-        """Smooth surfaces that bound the body, one after the other from below."""
+        """Smooth surfaces that bound the body, in order along the axis, the lowest first."""
         return [
             Piece(Compiled(evaluate, "level", self._packed([s], whole=False)), self._box([s])) for s in self._profile
         ]
@@ -186,7 +186,7 @@ class Revolved(Levelled, Body):
 
     @cached_property
     def compiled(self) -> Compiled:
-        """Compiled level evaluator."""
+        """Compiled function that gives F, its gradient and its Hessian."""
         return Compiled(evaluate, "level", self._packed(self._profile))
 
     def piece(self, points: FloatArray) -> IntArray:
@@ -224,15 +224,15 @@ class Revolved(Levelled, Body):
         return found
 
     def tiles(self, edge: float) -> tuple[FloatArray, FloatArray, IntArray]:
-        """The body as triangles with sides of about ``edge``, L, at most, in rings about the axis.
+        """Triangulate the body, in rings about the axis; sides are at most about ``edge``, L.
 
         Returns
         -------
         corners, normals : (m, 3, 3), L and 1
-            Counter-clockwise seen from outside; on the piece of the triangle, its normals there. At a tip the normal is
-            that towards the middle of the triangle.
+            Corners of the triangles, counter-clockwise seen from outside, and unit normals of the piece there. At a
+            tip the normal is that of the side towards the middle of the triangle.
         pieces : (m,)
-            No triangle lies on two.
+            Number of the piece of each triangle; each lies on one piece.
 
         Raises
         ------
@@ -272,7 +272,7 @@ class Revolved(Levelled, Body):
         return np.concatenate(corners), np.concatenate(normals), np.concatenate(pieces)
 
     def squares(self, at: FloatArray) -> Squares:
-        """Few squares that cover the body, and their points at u and v ``at`` (n,), from 0 to 1."""
+        """Patches 0 <= u, v <= 1 that cover the body, and their points at all pairs u, v of the numbers ``at`` (n,)."""
         found = revolved_squares(self._profile, 6 if self._stretch == 1.0 else 12, at)
         return found._replace(vertices=self._placed(found.vertices), places=self._placed(found.places))
 
@@ -283,7 +283,7 @@ class Revolved(Levelled, Body):
 
     @cached
     def atlas(self) -> CubeSphereAtlas | NoCharts:
-        """Six charts of a body that has neither edges nor tips and is seen whole from the middle of its box."""
+        """Six charts of a body about z without edges or tips that is star-shaped about its middle; else `NoCharts`."""
         from scatterers.kernels.charts import one_cell
 
         sharp = [crease for crease in self.creases if crease.kind in SHARP]

@@ -91,7 +91,7 @@ class SplineBody(LevelBody):
 
     @property
     def quick_charts(self) -> bool:
-        """Whether charts are available without computation; otherwise only phase maps compute them."""
+        """Whether charts are available at once. If not, they take long to compute; only phase maps ask for them."""
         return self._map is not None
 
     def _covered(self) -> "CubeSphereAtlas | MongeAtlas":

@@ -85,15 +85,15 @@ class SurfaceCurrents:
     values : (n,) complex
         Field u, or du/dn (1/L) on a soft boundary. On a conductor (n, 3, 2): n x H for incident waves of unit E along
         theta and phi.
-    change : as values
-        Second-order part of the values; residual of the equation for solved currents.
+    change : shaped as ``values``
+        Second-order part of the values; for solved currents the residual of the equation.
     lit : (n,) of bool
         Whether the lit side's expansion gave the value, rather than creeping rays. For solved currents: whether the
         node is lit.
     wavenumber : float, 1/L
     boundary : Boundary
     rim : (l, 3), L
-        Equally spaced points of the shadow line; none of solved currents.
+        Equally spaced points of the shadow line; empty for solved currents.
     rim_length : float, L
         Length of the shadow line.
     unserved : float
@@ -182,11 +182,11 @@ class SurfaceCurrents:
 
     @property
     def bounces(self) -> bool:
-        """Whether `reflected_onto` knows the boundary."""
+        """Whether `reflected_onto` supports the boundary."""
         return self.boundary.kind in ("soft", "hard", "conductor")
 
     def reflected_onto(self, points: FloatArray, normals: FloatArray) -> ComplexArray:
-        """u, or du/dn if soft (m,), that points (m, 3), L, of the body, with normals, receive from nodes above them."""
+        """Field u (du/dn if soft) that nodes radiate onto points (m, 3), L, of the body; normals (m, 3): (m,)."""
         u, slope = self._scalar(self.values)
         nothing = np.zeros(len(self.points), dtype=complex)
         single, double = (nothing if one is None else one / (4 * np.pi) for one in (slope, u))
@@ -228,7 +228,7 @@ class SurfaceCurrents:
         return np.asarray(np.hypot(error, 0.0 if self.solved else 4e-4 * self._amplitude))
 
     def total(self, points: FloatArray, dark: BoolArray) -> tuple[ComplexArray, FloatArray]:
-        """Total field and its error at points (m, 3), L, off the body, some of them in the shadow: (m,) each."""
+        """Total field and its error at points (m, 3), L, off the body; ``dark`` (m,) marks shadow points: (m,) each."""
         lit, shadow, factor = self._levels
         if self.boundary.kind == "impedance":
             # most of what is wrong with its currents stands at the line and radiates ahead
@@ -247,7 +247,7 @@ class SurfaceCurrents:
 
     @cached_property
     def left_of_each(self) -> FloatArray:
-        """What is left inside, as `extinction`, of each field and incident wave: (1, 1)."""
+        """Extinction error by field (rows) and incident wave (columns), as `extinction`: (1, 1)."""
         return np.array([[self.extinction]])
 
     def _together(self, directions: FloatArray) -> FloatArray:
@@ -281,7 +281,7 @@ class SurfaceCurrents:
 
     @cached_property
     def stepped(self) -> float:
-        """What steps of an admittance between nodes may change f by, L: k/(4 pi) delta eta u^2 dS of all, by chance."""
+        """Estimated error of f, L, from admittance steps between nodes: rms sum of k/(4 pi) delta eta u^2 dS."""
         if not self.boundary.varies:
             return 0.0
         eta = np.broadcast_to(self.boundary.at(self.points).admittance, (len(self.points),))

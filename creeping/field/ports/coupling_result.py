@@ -65,10 +65,10 @@ class CouplingPaths:
 class Coupling(ArrayResult, WithStatus, Drawn, Tabled):
     """Matrix of fields between ports on a body; entry (i, j) is the field at port j of a unit source at port i.
 
-    The field is u of e^{ikr}/(4 pi r) for `coupling`, H along slot j of a magnetic dipole along slot i for
-    `slot_coupling`, and E along the normal of an electric dipole along the normal for `monopole_coupling`. For
-    `antenna_coupling` it is H or E, as the receiver is a slot or a monopole. The result is usable as the array of its
-    values.
+    For `coupling` the source is e^{ikr}/(4 pi r) and the field is u. For `slot_coupling` the source is a magnetic
+    dipole along slot i and the field is H along slot j. For `monopole_coupling` the source is an electric dipole along
+    the normal and the field is E along the normal. For `antenna_coupling` the field is H at slots and E at monopoles.
+    The result is usable as the array of its values.
 
     Attributes
     ----------
@@ -136,7 +136,7 @@ class Coupling(ArrayResult, WithStatus, Drawn, Tabled):
 
     @property
     def db(self) -> FloatArray:
-        """20 log10 of the values' size (n, n), dB re 1 `unit`; inf on the diagonal."""
+        """20 log10 |values| (n, n), dB relative to 1 `unit`; inf on the diagonal."""
         with np.errstate(divide="ignore"):
             return np.asarray(20 * np.log10(np.abs(self.values)))
 

@@ -69,7 +69,7 @@ def coupling(
     Parameters
     ----------
     body : Surface
-        Smooth and without a speed.
+        Smooth and not weighted (without ``speed``).
     ports : (n, 3), L
         On the body, two or more.
     wavenumber : float or (f,), 1/L
@@ -138,7 +138,7 @@ def slot_coupling(
     Parameters
     ----------
     body : Surface
-        Smooth and without a speed.
+        Smooth and not weighted (without ``speed``).
     ports : (n, 3), L
         On the body, two or more, no two at the same point.
     axes : (n, 3) or (3,)
@@ -202,7 +202,7 @@ def monopole_coupling(
     Parameters
     ----------
     body : Surface
-        Smooth and without a speed.
+        Smooth and not weighted (without ``speed``).
     ports : (n, 3), L
         On the body, two or more, no two at the same point.
     wavenumber : float or (f,), 1/L
@@ -279,7 +279,7 @@ def antenna_coupling(
     Parameters
     ----------
     body : Surface
-        Smooth and without a speed.
+        Smooth and not weighted (without ``speed``).
     slots : (n, 3), L
         On the body, one or more.
     axes : (n, 3) or (3,)

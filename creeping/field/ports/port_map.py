@@ -39,8 +39,8 @@ class PortField(PointField):
     Attributes
     ----------
     points, values, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
-        As for every field at points. Values and error, 1/L, are infinite at the source. ``method`` is "rays", "beams"
-        near caustics, or "none" at the source.
+        Shared by all fields at points, see `creeping.field.results.point_result.PointData`. Values and error, 1/L,
+        are infinite at the source. ``method`` is "rays", "beams" near caustics, or "none" at the source.
     source : (3,), L
         Position of the source.
 
@@ -80,7 +80,7 @@ def port_field(
     Parameters
     ----------
     body : Surface
-        Smooth and without a speed.
+        Smooth and not weighted (without ``speed``).
     source : (3,), L
         On the body.
     points : (..., 3), L

@@ -44,8 +44,8 @@ class Comparison:
         Reference angles or frequencies within the computed range: degrees or Hz.
     levels, reference : (m,), dB
         Computed levels, interpolated at ``values``, and reference levels.
-    shift : float
-        Shift of the reference angles or frequencies that makes both agree best.
+    shift : float, degrees or Hz
+        Shift of the reference angles or frequencies that gives the best agreement.
     within : float
         Share of the points at which the reference lies within the stated error; NaN if no error was given.
     wrapped : int
@@ -83,7 +83,7 @@ class Comparison:
 
     @property
     def austin(self) -> float:
-        """Mean |residual|, dB, as in the Austin suite: levels are cut off 80 dB below the largest of the reference."""
+        """Mean |residual|, dB, as in Austin RCS benchmarks: levels are cut off 80 dB below the largest reference."""
         least = self.reference.max() - 80.0
         return float(np.mean(np.abs(np.maximum(self.levels, least) - np.maximum(self.reference, least))))
 
@@ -368,7 +368,7 @@ class Echo(Drawn, Tabled):
 
     @property
     def viewer(self) -> str:
-        """What sees the body: "radar" or "sonar"."""
+        """Sensor that observes the body: "radar" or "sonar"."""
         return "radar" if self.quantity == "rcs" else "sonar"
 
     @property
@@ -409,7 +409,7 @@ class Echo(Drawn, Tabled):
         return dataset(variables, coordinates)
 
     def summary(self) -> dict[str, Any]:
-        """Sizes, largest level of each channel, error and number of unresolved values, by name."""
+        """Numbers of angles and frequencies, largest level per channel, error, number of unresolved values, by name."""
         levels, off = self.levels(), error_decibels(self.total, self.error)
         known = off[np.isfinite(off)]
         return {

@@ -45,9 +45,10 @@ class ConductorField(PointData):
     Attributes
     ----------
     points, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
-        As for every field at points; the error holds for E and for H. Off the body ``method`` is "currents",
-        "equation" (currents from the integral equation), "layer" (interpolated between the body and the currents'
-        field, next to the body) or "rays"; on the body as in `ConductorCurrent`.
+        Shared by all fields at points, see `creeping.field.results.point_result.PointData`. The error holds for E
+        and for H. Off the body ``method`` is "currents", "equation" (currents from the integral equation), "layer"
+        (next to the body: interpolated between the field on the body and that of the currents) or "rays"; on the
+        body as in `ConductorCurrent`.
     incident, scattered, creeping : Fields
         Parts that add up to the field. Currents and the lit side's expansion give ``incident`` and ``scattered``. Rays
         give ``creeping``, which in the shadow is the total field.
@@ -111,15 +112,15 @@ class ConductorCurrent(ArrayResult, PointData):
     Attributes
     ----------
     points, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
-        As for every field at points. ``method`` is "lit" (the lit side's expansion), "march"
-        (waves marched along rays, with beams near caustics), "rays" (creeping modes), or, in the penumbra, "lit+march"
-        or "lit+rays".
+        Shared by all fields at points, see `creeping.field.results.point_result.PointData`. ``method`` is "lit"
+        (the lit side's expansion), "march" (waves marched along rays, with beams near caustics), "rays" (creeping
+        modes), or, in the penumbra, "lit+march" or "lit+rays".
     values : (..., 3) or (..., 3, 2) complex
     charge : (...) or (..., 2) complex
         n.E = div J/(ik): surface charge density over the permittivity of free space, in units of the incident E.
     charge_error : (...) or (..., 2)
-        Error of the charge, as ``error``: sqrt(2) times that of J for expansions, estimated apart for the equation.
-    lit, creeping : as values
+        Error of the charge: sqrt(2) times that of J for expansions; estimated separately for the integral equation.
+    lit, creeping : shaped as ``values``
         Parts that add up to the values: the lit side's expansion, and creeping rays.
     incident_electric : (3,) or (3, 2) complex
         E0 of the incident wave; (3, 2) for both polarisations, if none was chosen.

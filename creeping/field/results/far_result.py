@@ -55,10 +55,10 @@ class FarField(Drawn, Tabled):
         edges). For sums over rays: how the creeping part was computed, "forward", "rays", "fan", or several joined
         by "+".
     unresolved : (m,) of bool
-        Sums over rays: True if more than a twentieth of the field is missing or not to be trusted: at caustics of
-        creeping or reflected rays, in the forward lobe of a body that is not convex, where rays end too early; or if
-        k times the radius of curvature is below 4 and the error exceeds half the sum of all contributions. Currents:
-        True if the error exceeds a tenth of the largest |f|.
+        For sums over rays, True if more than a twentieth of the field is missing or unreliable: at caustics of
+        creeping or reflected rays, in the forward lobe of a body that is not convex, or where rays end too early.
+        Also True if k times the radius of curvature is below 4 and the error exceeds half the sum of all
+        contributions. For currents, True if the error exceeds a tenth of the largest |f|.
     error : (m,) or (m, 2, 2), L
         Error of |f|. It covers 95 % of directions; NaN where it is not known.
     error_by : str
@@ -73,7 +73,7 @@ class FarField(Drawn, Tabled):
     unit : str
         Unit of length: "m" if the body states it, else "L".
     validity : Validity, optional
-        Least k rho and largest kappa_t rho/m^2 on the rays of the fan; set by `far_field`.
+        Least k rho and largest kappa_t rho/m^2 on the rays of the fan (`creeping.validity`); set by `far_field`.
 
     Raises
     ------
@@ -175,7 +175,7 @@ class FarField(Drawn, Tabled):
 
     @property
     def target_strength(self) -> FloatArray:
-        """Sonar target strength 20 log10 |f|, dB relative to L (a metre if L is one), shaped as ``total``."""
+        """Sonar target strength 20 log10 |f|, dB relative to L (to 1 m if L is the metre), shaped as ``total``."""
         return decibels(self.total)
 
     def to_xarray(self) -> xarray.Dataset:

@@ -72,7 +72,7 @@ class Tabled:
         raise NotImplementedError
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """Contents of `to_xarray` as a ``pandas.DataFrame``, one row per value, without vectors."""
+        """Contents of `to_xarray` as a ``pandas.DataFrame``, one row per value; vectors (x, y, z) are left out."""
         return self.to_xarray().drop_dims("axis", errors="ignore").to_dataframe()
 
 

@@ -123,7 +123,7 @@ class PointData(Shown, WithStatus, Tabled):
     boundary : str
     order : int
     validity : Validity
-        Least k rho and largest kappa_t rho/m^2 on the fan's rays.
+        Least k rho and largest kappa_t rho/m^2 on the fan's rays, see `creeping.validity`.
     length_unit : str
         "m" where the body knows it, else "L".
     """
@@ -203,10 +203,11 @@ class NearField(PointField):
     Attributes
     ----------
     points, values, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
-        As for every field at points. Off the body ``method`` is "currents", "equation" (currents from the integral
-        equation), "layer" (interpolated between the body and the currents' field, next to the body), "rays", or
-        "none", where the admittance varies and no method applies. On the body it is "lit", "rays", "march",
-        "lit+rays", "lit+march", "equation", or "boundary", where u = 0.
+        Shared by all fields at points, see `creeping.field.results.point_result.PointData`. Off the body ``method``
+        is "currents", "equation" (currents from the integral equation), "layer" (next to the body: interpolated
+        between the field on the body and that of the currents), "rays", or "none" (the admittance varies and no
+        method applies). On the body it is "lit", "rays", "march", "lit+rays", "lit+march", "equation", or "boundary"
+        (a soft body, u = 0).
     incident, scattered, creeping : (...) complex
         Parts that add up to the values. Currents and the lit side's expansion give ``incident`` and ``scattered``.
         Rays give ``creeping``, which in the shadow is the total field.
@@ -236,8 +237,9 @@ class SurfaceField(PointField):
     Attributes
     ----------
     points, values, error, error_by, status, method, wavenumber, boundary, order, validity, length_unit
-        As for every field at points. ``method`` is "lit" (the lit side's expansion), "rays" (creeping modes), "march"
-        (waves marched along rays, with beams near caustics), "lit+rays" or "lit+march" in the penumbra, or "equation".
+        Shared by all fields at points, see `creeping.field.results.point_result.PointData`. ``method`` is "lit"
+        (the lit side's expansion), "rays" (creeping modes), "march" (waves marched along rays, with beams near
+        caustics), "lit+rays" or "lit+march" in the penumbra, or "equation".
     lit, creeping : (...) complex
         Parts that add up to the values: the lit side's expansion, and creeping rays. For "equation": the values on
         the lit side, and those on the shadow side.

@@ -60,8 +60,9 @@ class TMatrix(Drawn):
 
     Attributes
     ----------
-    matrix : ((L + 1)^2,) * 2 or (2 L (L + 2),) * 2 complex
-        Maps regular incident waves to outgoing waves. For a conductor electric and magnetic multipoles of E alternate.
+    matrix : (N, N) complex, N = (l + 1)^2 or, for a conductor, 2 l (l + 2)
+        Maps regular incident waves to outgoing waves; l is the `order`. For a conductor electric
+        and magnetic multipoles of E alternate.
     wavenumber : float, 1/L
     center : (3,), L
         Centre of the spherical waves.
@@ -73,7 +74,7 @@ class TMatrix(Drawn):
     extinction : float
         Extinction error: rms residual field of plane waves inside the body, relative to them; NaN if not known.
     absorbing : bool
-        Whether the body absorbs; if so, S need not be unitary.
+        Whether the body absorbs; if so, S = 1 + 2 T need not be unitary.
     unit : str
         Unit of length: "m" if the body states it, else "L".
 
