@@ -281,7 +281,7 @@ class SurfaceCurrents:
 
     @cached_property
     def stepped(self) -> float:
-        """Estimated error of f, L, from admittance steps between nodes: rms sum of k/(4 pi) delta eta u^2 dS."""
+        """Error of f, L, from admittance steps somewhere between nodes: rms sum of k/(4 pi) 2 |u| delta eta dS."""
         if not self.boundary.varies:
             return 0.0
         eta = np.broadcast_to(self.boundary.at(self.points).admittance, (len(self.points),))
