@@ -203,9 +203,12 @@ def _outcomes(
             with client.as_current(), suppress(TimeoutError):
                 done = distributed.wait(list(flying), timeout=1.0, return_when="FIRST_COMPLETED").done
             while done:
-                # no reference is kept: results of what has been told are released
+                # released at once, whoever still refers to it: were its worker to die, it would be computed again, and
+                # what has been marked as done be written anew
                 future = done.pop()
-                yield flying.pop(future), _outcome(future)
+                number, outcome = flying.pop(future), _outcome(future)
+                future.release()
+                yield number, outcome
     except CancelledError as error:
         raise CreepingError(
             f"the cluster gave up a task ({error}); see to its scheduler; what is done is kept: resume"

@@ -40,7 +40,7 @@ def test_a_conductor_has_all_its_polarisations_by_rays_too_where_it_has_a_flow()
 def test_echoes_of_many_angles_take_it_by_themselves(monkeypatch):
     # of bodies without mirrors
     two = sc.Bodies([BODY, sc.Sphere(0.3)], at=[[0, 0, 0], [1, 2, 0.7]])
-    assert pays(two, K, "hard", 2000) and not pays(two, K, "hard", 1)
+    assert pays(two, np.array([K]), "hard", 2000) and not pays(two, np.array([K]), "hard", 1)
     made = []
     monkeypatch.setattr(echoes, "pays", lambda body, k, boundary, count: made.append(count) or count > 2)
     asked = {"wavenumbers": 1.0, "boundary": "hard", "elevation": 20.0}
