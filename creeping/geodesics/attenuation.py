@@ -111,15 +111,14 @@ class Sliding(NamedTuple):
         Numbers of the knots among them.
     first : (intervals,)
         First of the knots of an interval's polynomial, by its number among the knots.
-    position, velocity : (intervals, points, 12)
-        From x, x', x'' at the first of the knots, at the second, and so on, to x and x' at the points.
+    weights : (intervals, points, 2, 4, 3)
+        Of x, x', x'' at each of the four knots in x and in x' at the points.
     """
 
     times: FloatArray
     knots: IntArray
     first: IntArray
-    position: FloatArray
-    velocity: FloatArray
+    weights: FloatArray
 
 
 def curvature_values(body: Surface, states: FloatArray) -> FloatArray:
@@ -227,20 +226,22 @@ def _along(body: Surface, states: FloatArray, fine: Sliding, place: IntArray, ou
 
 def _bent(body: Surface, states: FloatArray, fine: Sliding) -> FloatArray:
     """c^(3/2) kappa_n at the ends of each fine interval and at the Gauss points between: (intervals, NODES, n)."""
-    x, p = states[:, fine.knots, :3], states[:, fine.knots, 3:]
-    along, turning = vector_field(body, x, p)
-    speed = speed_of(body)
-    if speed is not None:
-        turning = speed.value(x)[..., None] * turning + np.sum(speed.gradient(x) * along, axis=-1, keepdims=True) * p
-    # x, x', x'' at the knots around each interval, by rows
-    jets = np.stack([x, along, turning], axis=2)
-    around = jets[:, fine.first[:, None] + np.arange(4)].reshape(len(states), len(fine.first), 12, 3)
-    between = np.concatenate([fine.position @ around, fine.velocity @ around], axis=-1)
+    from creeping.geodesics.kernels.attenuation import curvatures_between
+
     bent = np.empty((len(fine.first), NODES, len(states)))
-    ends = curvature_values(body, states.reshape(-1, 6)).reshape(states.shape[:2]).T
-    bent[:, 0], bent[:, -1] = ends[:-1], ends[1:]
-    inside = curvature_values(body, between.reshape(-1, 6)).reshape(between.shape[:3])
-    bent[:, 1:-1] = np.moveaxis(inside, 0, 2)
+    ends = curvature_values(body, states.reshape(-1, 6)).reshape(states.shape[:2])
+    bent[:, 0], bent[:, -1] = ends.T[:-1], ends.T[1:]
+    x, p, kappa = states[:, fine.knots, :3], states[:, fine.knots, 3:], ends[:, fine.knots]
+    speed = speed_of(body)
+    if speed is None:
+        along, turning = vector_field(body, x, p, kappa)
+    else:
+        c = speed.value(x)
+        along, turning = vector_field(body, x, p, kappa / c**1.5)
+        turning = c[..., None] * turning + np.sum(speed.gradient(x) * along, axis=-1, keepdims=True) * p
+    jets = np.concatenate([x, along, turning], axis=2)
+    with evaluators(body) as parts:
+        curvatures_between(*parts, jets, fine.first, fine.weights, bent[:, 1:-1])
     return bent
 
 
@@ -288,9 +289,7 @@ def sliding(outputs: FloatArray, spacing: float, points: FloatArray) -> Sliding:
     nodes = knots[first[:, None] + np.arange(4)]
     # differences first: a point of an interval next to a knot must not fall onto it
     tau = (fine[:-1, None] - nodes)[:, None, :] + (np.diff(fine)[:, None] * points)[:, :, None]
-    position, velocity = _taylor(tau) if short else _hermite(tau, nodes)
-    shape = len(first), len(points), 12
-    return Sliding(fine, kept, first, position.reshape(shape), velocity.reshape(shape))
+    return Sliding(fine, kept, first, np.stack(_taylor(tau) if short else _hermite(tau, nodes), axis=2))
 
 
 def _hermite(tau: FloatArray, nodes: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -89,16 +89,23 @@ def sharpest_curvature(body: Surface) -> float:
     return memo(body, "sharpest curvature", found)
 
 
-def vector_field(body: Surface, points: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Right-hand sides (x', p') of the flow at points, L, and unit tangents: twice (..., 3) -> twice (..., 3)."""
-    g, h = body.gradient(points), body.hessian(points)
-    bent = second_form(directions, h)
-    turning = -(bent / np.sum(g * g, axis=-1))[..., None] * g
+def vector_field(
+    body: Surface, points: FloatArray, directions: FloatArray, kappa: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Right-hand sides (x', p') of the flow at points, L, and unit tangents: twice (..., 3) -> twice (..., 3).
+
+    ``kappa`` (...), 1/L, are the normal curvatures along the tangents where they are known.
+    """
+    g = body.gradient(points)
+    steep = np.sqrt(np.sum(g * g, axis=-1, keepdims=True))
+    n = g / steep
+    if kappa is None:
+        kappa = second_form(directions, body.hessian(points)) / steep[..., 0]
+    turning = -kappa[..., None] * n
     speed = speed_of(body)
     if speed is None:
         return directions, turning
     c, dc = speed.value(points)[..., None], speed.gradient(points)
-    n = g / np.linalg.norm(g, axis=-1, keepdims=True)
     along_n = np.sum(dc * n, axis=-1, keepdims=True)
     along_u = np.sum(dc * directions, axis=-1, keepdims=True)
     return c * directions, -dc + along_n * n + along_u * directions + c * turning

@@ -23,9 +23,6 @@ from creeping.kernels.threads import in_threads
 
 NEAR = 1e-2
 """Longest step, in body sizes, that brings an interpolated point onto the line; nodes are much closer."""
-_OFFSETS = np.arange(-5, 7)
-"""Nodes around a place that a polynomial along a curve goes through."""
-_SCALES = np.array([np.prod([j - i for i in _OFFSETS if i != j], dtype=float) for j in _OFFSETS])
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,18 +133,13 @@ def interpolated(rows: FloatArray, first: IntArray | int, number: IntArray | int
     >>> bool(np.allclose(interpolated(circle, 0, 32, np.array([4.0, 8.5])) ** 2 @ [1, 1], 1.0, atol=1e-10))
     True
     """
-    whole = np.floor(places).astype(np.int64)
-    u = (places - whole)[:, None] - _OFFSETS
-    before, after = np.ones_like(u), np.ones_like(u)
-    before[:, 1:] = np.cumprod(u[:, :-1], axis=1)
-    after[:, :-1] = np.cumprod(u[:, :0:-1], axis=1)[:, ::-1]
-    weights = before * after / _SCALES
-    around = np.asarray(first)[..., None] + (whole[:, None] + _OFFSETS) % np.asarray(number)[..., None]
-    # one after the other: sums of a library's own order differ with the number of rows
-    total = weights[:, :1] * rows[around[:, 0]]
-    for j in range(1, len(_OFFSETS)):
-        total += weights[:, j : j + 1] * rows[around[:, j]]
-    return np.asarray(total)
+    from creeping.shadow.kernels.interpolation import interpolate
+
+    out = np.empty((len(places), rows.shape[1]))
+    # of arrays of another kind kernels would be compiled once more
+    first, number = (np.array(np.broadcast_to(one, len(places)), dtype=np.int64) for one in (first, number))
+    interpolate(np.ascontiguousarray(rows), first, number, np.ascontiguousarray(places), out)
+    return out
 
 
 class Moved(NamedTuple):

@@ -22,7 +22,7 @@ from creeping.geometry.evaluators import evaluators
 from creeping.geometry.incident import rows_of
 from creeping.geometry.surface import Surface, memo, normal, project, size
 from creeping.geometry.triangulation import Triangulation, triangulate
-from creeping.kernels.threads import in_slices
+from creeping.kernels.threads import in_threads
 from creeping.shadow.curves import LineNodes
 from creeping.shadow.refinement import halved
 from creeping.shadow.status import LineStatus
@@ -105,8 +105,8 @@ def _packed(body: Surface, mesh: Triangulation, nodes: int) -> tuple[Any, ...]:
     return (
         np.ascontiguousarray(mesh.vertices.T),
         np.ascontiguousarray(n.T),
-        # of one layout, for which kernels are compiled once
-        np.ascontiguousarray(mesh.triangles, dtype=np.int32),
+        # of one layout, for which kernels are compiled once; without a sign, of which each index would be asked
+        np.ascontiguousarray(mesh.triangles, dtype=np.uint32),
         neighbours_of(mesh.triangles),
         mesh.edge_length,
         float(np.sqrt(np.mean(turn**2))),
@@ -114,7 +114,7 @@ def _packed(body: Surface, mesh: Triangulation, nodes: int) -> tuple[Any, ...]:
     )
 
 
-def neighbours_of(triangles: IntArray) -> np.ndarray[Any, np.dtype[np.int32]]:
+def neighbours_of(triangles: IntArray) -> np.ndarray[Any, np.dtype[np.uint32]]:
     """Triangle across the edge from corner k to corner k + 1, for a closed oriented mesh: (m, 3) -> (m, 3)."""
     m = len(triangles)
     edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2).astype(np.int64)
@@ -122,7 +122,7 @@ def neighbours_of(triangles: IntArray) -> np.ndarray[Any, np.dtype[np.int32]]:
     reverse = edges[:, 1] * (edges.max() + 1) + edges[:, 0]
     order = np.argsort(code)
     across = order[np.searchsorted(code[order], reverse)] // 3
-    return np.asarray(across.reshape(m, 3), dtype=np.int32)
+    return np.asarray(across.reshape(m, 3), dtype=np.uint32)
 
 
 def singular_segments(body: Surface, mesh: Triangulation) -> FloatArray:
@@ -152,18 +152,17 @@ def critical_distances(body: Surface, waves: FloatArray) -> FloatArray:
     least = np.full(len(rows), np.inf)
 
     def run(part: slice) -> None:
-        for row in range(part.start, part.stop):
-            d, w = rows[row, :3], rows[row, 3]
-            q = d + w * x if w else np.broadcast_to(d, x.shape)
-            # where q comes to be along the null direction between two ends
-            along = (np.sum(b * q, axis=1) if w else b @ d).reshape(-1, 2)
-            crossed = np.repeat((along[:, 0] > 0) != (along[:, 1] > 0), 2)
-            if crossed.any():
-                value = np.sum(n[crossed] * q[crossed], axis=1) / np.linalg.norm(q[crossed], axis=1)
-                (first, last), (low, high) = along[crossed[::2]].T, value.reshape(-1, 2).T
-                least[row] = np.min(np.abs(low + first / (first - last) * (high - low)))
+        q = rows[part, None, :3] + rows[part, None, 3:] * x
+        # where q comes to be along the null direction between two ends
+        along, value = (np.einsum("rek,ek->re", q, one).reshape(len(q), -1, 2) for one in (b, n))
+        row, segment = np.nonzero((along[..., 0] > 0) != (along[..., 1] > 0))
+        value = value[row, segment] / np.linalg.norm(q.reshape(len(q), -1, 2, 3)[row, segment], axis=-1)
+        first, last = along[row, segment].T
+        between = value[:, 0] + first / (first - last) * (value[:, 1] - value[:, 0])
+        np.minimum.at(least, part.start + row, np.abs(between))
 
-    in_slices(run, len(rows), multiple=1)
+    # of many segments it takes much memory
+    in_threads(run, len(rows), least=256, most=64)
     for row in np.flatnonzero(rows[:, 3]):
         height = clearance(body, -rows[row, :3] / rows[row, 3])
         if height < size(body):

@@ -17,24 +17,77 @@ from creeping.kernels.exponential import second_form
 def curvatures(level, level_par, speed, speed_par, weighted, states, out):
     """c^(3/2) kappa_n of states (n, 6 or more), x and a vector of any length along the ray, into out (n,)."""
     n = states.shape[0]
-    x, geometry = aligned(3, BLOCK), aligned(10, BLOCK)
+    y, geometry = aligned(6, BLOCK), aligned(10, BLOCK)
     for start in range(0, n, BLOCK):
         count = min(BLOCK, n - start)
         for i in range(BLOCK):
-            for k in range(3):
-                x[k, i] = states[start + min(i, count - 1), k]
-        level(x, geometry[0], geometry[1:4], geometry[4:], level_par)
-        for i in range(count):
-            px, py, pz = states[start + i, 3], states[start + i, 4], states[start + i, 5]
-            xx, yy, zz, yz = geometry[4, i], geometry[5, i], geometry[6, i], geometry[7, i]
-            bent = second_form(px, py, pz, xx, yy, zz, yz, geometry[8, i], geometry[9, i])
-            steep = math.sqrt(geometry[1, i] ** 2 + geometry[2, i] ** 2 + geometry[3, i] ** 2)
-            out[start + i] = bent / ((px * px + py * py + pz * pz) * steep)
+            for k in range(6):
+                y[k, i] = states[start + min(i, count - 1), k]
+        level(y[:3], geometry[0], geometry[1:4], geometry[4:], level_par)
+        _curvature(y.reshape(-1), geometry.reshape(-1))
         if weighted:
-            speed(x, geometry[0], geometry[1:4], geometry[4:], speed_par)
-            for i in range(count):
-                c = geometry[0, i]
-                out[start + i] *= c * math.sqrt(c)
+            speed(y[:3], geometry[0], geometry[1:4], geometry[4:], speed_par)
+            _weigh(y[3], geometry[0])
+        for i in range(count):
+            out[start + i] = y[3, i]
+
+
+@njit(**entry_options)
+def curvatures_between(level, level_par, speed, speed_par, weighted, jets, first, weights, out):
+    """c^(3/2) kappa_n at points of polynomials (`attenuation.Sliding`), into out (intervals, points, n).
+
+    jets (n, knots, 9) are x, x' and x'' at the knots, the knots of an interval four from its ``first`` on; weights
+    (intervals, points, 2, 4, 3) those of x and x' at its points.
+    """
+    n, knots = jets.shape[0], jets.shape[1]
+    y, geometry, own = aligned(6, BLOCK), aligned(10, BLOCK), aligned(knots, 9 * BLOCK)
+    for start in range(0, n, BLOCK):
+        count = min(BLOCK, n - start)
+        for knot in range(knots):
+            for lane in range(9):
+                for i in range(BLOCK):
+                    own[knot, lane * BLOCK + i] = jets[start + min(i, count - 1), knot, lane]
+        for m in range(first.shape[0]):
+            for q in range(weights.shape[1]):
+                y[:] = 0.0
+                for j in range(4):
+                    _add(weights[m, q, 0, j], weights[m, q, 1, j], own[first[m] + j], y.reshape(-1))
+                level(y[:3], geometry[0], geometry[1:4], geometry[4:], level_par)
+                _curvature(y.reshape(-1), geometry.reshape(-1))
+                if weighted:
+                    speed(y[:3], geometry[0], geometry[1:4], geometry[4:], speed_par)
+                    _weigh(y[3], geometry[0])
+                for i in range(count):
+                    out[m, q, start + i] = y[3, i]
+
+
+@njit(**options)
+def _add(position, velocity, jet, y):
+    """Add x and x' of a block from (x, x', x'') at a knot by their weights (3,), rows flat."""
+    p0, p1, p2, v0, v1, v2 = position[0], position[1], position[2], velocity[0], velocity[1], velocity[2]
+    for i in range(3 * BLOCK):
+        a, b, c = jet[i], jet[3 * BLOCK + i], jet[6 * BLOCK + i]
+        y[i] += p0 * a + p1 * b + p2 * c
+        y[3 * BLOCK + i] += v0 * a + v1 * b + v2 * c
+
+
+@njit(**options)
+def _curvature(y, g):
+    """kappa_n along the vectors of a block of states, into the fourth row of y; all rows flat."""
+    for i in range(BLOCK):
+        px, py, pz = y[3 * BLOCK + i], y[4 * BLOCK + i], y[5 * BLOCK + i]
+        gx, gy, gz = g[BLOCK + i], g[2 * BLOCK + i], g[3 * BLOCK + i]
+        xx, yy, zz, yz = g[4 * BLOCK + i], g[5 * BLOCK + i], g[6 * BLOCK + i], g[7 * BLOCK + i]
+        bent = second_form(px, py, pz, xx, yy, zz, yz, g[8 * BLOCK + i], g[9 * BLOCK + i])
+        steep = math.sqrt(gx * gx + gy * gy + gz * gz)
+        y[3 * BLOCK + i] = bent / ((px * px + py * py + pz * pz) * steep)
+
+
+@njit(**options)
+def _weigh(bent, c):
+    """Multiply curvatures by c^(3/2)."""
+    for i in range(BLOCK):
+        bent[i] *= c[i] * math.sqrt(c[i])
 
 
 @njit(**options)

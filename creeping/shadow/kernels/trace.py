@@ -64,7 +64,9 @@ def lines_on_mesh(
     cap = 8 * int(math.sqrt(m)) + 1024
     s, marks, space = np.empty(n), np.full(m, -1), work_space()
     most = max(cap, x.shape[1])
-    raw, slopes, bent, left, h = np.empty((cap, 3)), np.empty((cap, 3)), np.empty(cap), np.empty(most), np.empty(most)
+    raw, slopes, bent, left = np.empty((cap, 3)), np.empty((cap, 3)), np.empty(cap), np.empty(most)
+    work = np.empty((3, most))
+    h = work[0]
     first, lengths, padded = np.empty(CURVES + 1, np.int64), np.empty(CURVES), np.empty((3, most + 2 * _AROUND))
     # a number of steps that is no constant, for which `move` would be compiled once more
     # next to a small loop a node with a longer step, in edges, would end on another branch
@@ -93,7 +95,7 @@ def lines_on_mesh(
             sure &= step < 1e-6 * extent
             good &= step < 1e-3 * extent
             if good:
-                whole, off, rough = _spaced(y, T, begin, curves, padded, h, spacing[row], again == 0)
+                whole, off, rough = _spaced(y, T, begin, curves, padded, work, spacing[row], again == 0)
                 good = whole < math.inf
         if good:
             found[row], error[row] = curves, off / whole
@@ -116,7 +118,7 @@ def _walk(mesh, wave, s, marks, number, crossings, first):
     first[0] = 0
     for begin in range(triangles.shape[0]):
         lit = (s[triangles[begin, 0]] < 0.0) + (s[triangles[begin, 1]] < 0.0) + (s[triangles[begin, 2]] < 0.0)
-        if lit % 3 == 0 or marks[begin] == number:
+        if lit == 0 or lit == 3 or marks[begin] == number:
             continue
         if curves == CURVES:
             return -1
@@ -204,22 +206,24 @@ def _resampled(x, tangents, first, curves, h, lengths, whole, wanted, out, start
 
 
 @njit(**options)
-def _spaced(x, tangents, starts, curves, padded, h, spacing, shift):
+def _spaced(x, tangents, starts, curves, padded, work, spacing, shift):
     """Spacings of the curves, in ``spacing``; with ``shift`` the nodes are moved along to equal arclengths.
 
     Returns the whole length, inf where the tangents tell none, and the sums of how far order 8 is off, and order 4 from
-    order 6.
+    order 6. padded (3, n) and work (3, n) are work space.
     """
     whole = error = rough = 0.0
+    h, off, far = work[0], work[1], work[2]
     for c in range(curves):
         begin, number = starts[c], starts[c + 1] - starts[c]
-        for m in range(number + 2 * _AROUND):
-            for k in range(3):
-                padded[k, m] = tangents[begin + (m - _AROUND) % number, k]
-        length = 0.0
+        for k in range(3):
+            for m in range(number):
+                padded[k, m + _AROUND] = tangents[begin + m, k]
+            for m in range(_AROUND):
+                padded[k, m], padded[k, number + _AROUND + m] = padded[k, number + m], padded[k, _AROUND + m]
+        # 1/|A|, and how far the other orders are off, in a loop that vectorises
         for m in range(number):
-            square = twelfth = eighth = sixth = fourth = 0.0
-            j = begin + m + 1 if m + 1 < number else begin
+            twelfth = eighth = sixth = fourth = 0.0
             for k in range(3):
                 twelve = eight = six = four = 0.0
                 for a in range(_AROUND):
@@ -228,18 +232,22 @@ def _spaced(x, tangents, starts, curves, padded, h, spacing, shift):
                     eight += _MEANS[1, a] * pair
                     six += _MEANS[2, a] * pair
                     four += _MEANS[3, a] * pair
-                square += (x[j, k] - x[begin + m, k]) ** 2
                 twelfth += twelve * twelve
                 eighth += eight * eight
                 sixth += six * six
                 fourth += four * four
-            # of unit length but for the turn of T
-            if not (twelfth > 1e-4 and eighth > 1e-4 and sixth > 1e-4 and fourth > 1e-4):
+            h[m] = 1.0 / math.sqrt(twelfth)
+            off[m], far[m] = abs(h[m] - 1.0 / math.sqrt(eighth)), abs(1.0 / math.sqrt(sixth) - 1.0 / math.sqrt(fourth))
+        length = 0.0
+        for m in range(number):
+            # A is of unit length but for the turn of T
+            if not (h[m] < 100.0 and off[m] < 100.0 and far[m] < 100.0):
                 return math.inf, math.inf, math.inf
-            h[m] = math.sqrt(square / twelfth)
+            chord = math.sqrt(_square(x, begin + m, begin + m + 1 if m + 1 < number else begin))
+            h[m] *= chord
             length += h[m]
-            error += abs(h[m] - math.sqrt(square / eighth))
-            rough += abs(math.sqrt(square / sixth) - math.sqrt(square / fourth))
+            error += chord * off[m]
+            rough += chord * far[m]
         spacing[c] = length / number
         whole += length
         passed = 0.0
