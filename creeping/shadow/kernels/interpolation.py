@@ -14,8 +14,10 @@ from creeping.kernels.block import strict_options as options
 
 AROUND = 6
 """Nodes on either side of a place that its polynomial goes through."""
-_SCALES = np.array([(-1) ** (11 - j) * math.factorial(j) * math.factorial(11 - j) for j in range(2 * AROUND)], float)
-"""prod_(i != j) (j - i)."""
+_INVERSE = 1 / np.array(
+    [(-1) ** (11 - j) * math.factorial(j) * math.factorial(11 - j) for j in range(2 * AROUND)], float
+)
+"""1/prod_(i != j) (j - i)."""
 
 
 @njit(**options)
@@ -24,20 +26,20 @@ def interpolate(rows, first, number, places, out):
 
     The curve of a place starts at node ``first`` (k,) and has so many, ``number`` (k,).
     """
-    weights = np.empty(2 * AROUND)
+    weights, nodes = np.empty(2 * AROUND), np.empty(2 * AROUND, np.int64)
     for i in range(places.shape[0]):
         whole = math.floor(places[i])
         u, node = places[i] - whole + (AROUND - 1), (np.int64(whole) - (AROUND - 1)) % number[i]
         before = after = 1.0
         for j in range(2 * AROUND):
-            weights[j] = before / _SCALES[j]
+            weights[j], nodes[j] = before * _INVERSE[j], first[i] + node
             before *= u - j
+            node = node + 1 if node + 1 < number[i] else 0
         for j in range(2 * AROUND - 1, -1, -1):
             weights[j] *= after
             after *= u - j
         for c in range(rows.shape[1]):
-            out[i, c] = 0.0
-        for j in range(2 * AROUND):
-            for c in range(rows.shape[1]):
-                out[i, c] += weights[j] * rows[first[i] + node, c]
-            node = node + 1 if node + 1 < number[i] else 0
+            total = 0.0
+            for j in range(2 * AROUND):
+                total += weights[j] * rows[nodes[j], c]
+            out[i, c] = total
