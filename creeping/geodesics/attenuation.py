@@ -241,7 +241,7 @@ def _bent(body: Surface, states: FloatArray, fine: Sliding) -> FloatArray:
         turning = c[..., None] * turning + np.sum(speed.gradient(x) * along, axis=-1, keepdims=True) * p
     jets = np.concatenate([x, along, turning], axis=2)
     with evaluators(body) as parts:
-        curvatures_between(*parts, jets, fine.first, fine.weights, bent[:, 1:-1])
+        curvatures_between(*parts, jets, fine.first, fine.weights, bent)
     return bent
 
 

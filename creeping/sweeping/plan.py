@@ -122,9 +122,13 @@ def task_size(request: SweepRequest, count: int, asked: int | None = None, *, sh
     """Incidences of a task unless asked for: not too large in memory, and ``shared`` enough of them to save often."""
     if asked:
         return min(int(asked), count)
-    most = -(-count // 32) if shared else min(count, 256)
+    if request.lattice is not None:
+        # nodes are computed together and serve a task: `studies sweep_speed --tables between`
+        most = min(count, 4096)
+    else:
+        most = min(-(-count // 32), 1024) if shared else min(count, 256)
     # 64 MB of results: memory that the next task takes again costs less than new memory
-    return int(np.clip(min(most, 64_000_000 // bytes_of(request)), 1, 1024))
+    return max(1, min(most, 64_000_000 // bytes_of(request)))
 
 
 def bytes_of(request: SweepRequest) -> int:

@@ -91,18 +91,19 @@ def factorise(mats, K, rhs, pole, soft, g, beta, per, f):
 
     The window of four rows is in registers: a11 ... a44 its upper half, r1 ... r4 its right-hand sides.
     """
-    nd = mats.shape[1]
+    # numba would compile `entry` for each pair of constants
+    nd, o = mats.shape[1], np.int64(0)
     br, bi = load(pole, 0), load(pole, LANES)
-    a11r, a11i = entry(mats, K, 0, 3, br, bi)
-    a12r, a12i = entry(mats, K, 1, 2, br, bi)
-    a22r, a22i = entry(mats, K, 1, 3, br, bi)
-    a13r, a13i = entry(mats, K, 2, 1, br, bi)
-    a23r, a23i = entry(mats, K, 2, 2, br, bi)
-    a33r, a33i = entry(mats, K, 2, 3, br, bi)
-    a14r, a14i = entry(mats, K, 3, 0, br, bi)
-    a24r, a24i = entry(mats, K, 3, 1, br, bi)
-    a34r, a34i = entry(mats, K, 3, 2, br, bi)
-    a44r, a44i = entry(mats, K, 3, 3, br, bi)
+    a11r, a11i = entry(mats, K, o, o + 3, br, bi)
+    a12r, a12i = entry(mats, K, o + 1, o + 2, br, bi)
+    a22r, a22i = entry(mats, K, o + 1, o + 3, br, bi)
+    a13r, a13i = entry(mats, K, o + 2, o + 1, br, bi)
+    a23r, a23i = entry(mats, K, o + 2, o + 2, br, bi)
+    a33r, a33i = entry(mats, K, o + 2, o + 3, br, bi)
+    a14r, a14i = entry(mats, K, o + 3, o, br, bi)
+    a24r, a24i = entry(mats, K, o + 3, o + 1, br, bi)
+    a34r, a34i = entry(mats, K, o + 3, o + 2, br, bi)
+    a44r, a44i = entry(mats, K, o + 3, o + 3, br, bi)
     r1r, r1i = load(rhs, 0), load(rhs, LANES)
     r2r, r2i = load(rhs, ROW), load(rhs, ROW + LANES)
     r3r, r3i = load(rhs, 2 * ROW), load(rhs, 2 * ROW + LANES)
@@ -144,10 +145,10 @@ def factorise(mats, K, rhs, pole, soft, g, beta, per, f):
         r2r, r2i = minus_times(r3r, r3i, l2r, l2i, u, v)
         r3r, r3i = minus_times(r4r, r4i, l3r, l3i, u, v)
         if j + 4 < nd:
-            a14r, a14i = entry(mats, K, j + 4, 0, br, bi)
-            a24r, a24i = entry(mats, K, j + 4, 1, br, bi)
-            a34r, a34i = entry(mats, K, j + 4, 2, br, bi)
-            a44r, a44i = entry(mats, K, j + 4, 3, br, bi)
+            a14r, a14i = entry(mats, K, j + 4, o, br, bi)
+            a24r, a24i = entry(mats, K, j + 4, o + 1, br, bi)
+            a34r, a34i = entry(mats, K, j + 4, o + 2, br, bi)
+            a44r, a44i = entry(mats, K, j + 4, o + 3, br, bi)
             r4r, r4i = load(rhs, (j + 4) * ROW), load(rhs, (j + 4) * ROW + LANES)
         else:
             a14r, a14i, a24r, a24i, a34r, a34i = zero, zero, zero, zero, zero, zero

@@ -34,7 +34,7 @@ def curvatures(level, level_par, speed, speed_par, weighted, states, out):
 
 @njit(**entry_options)
 def curvatures_between(level, level_par, speed, speed_par, weighted, jets, first, weights, out):
-    """c^(3/2) kappa_n at points of polynomials (`attenuation.Sliding`), into out (intervals, points, n).
+    """c^(3/2) kappa_n at points of polynomials (`attenuation.Sliding`), into out (intervals, NODES, n) but for its ends.
 
     jets (n, knots, 9) are x, x' and x'' at the knots, the knots of an interval four from its ``first`` on; weights
     (intervals, points, 2, 4, 3) those of x and x' at its points.
@@ -58,7 +58,7 @@ def curvatures_between(level, level_par, speed, speed_par, weighted, jets, first
                     speed(y[:3], geometry[0], geometry[1:4], geometry[4:], speed_par)
                     _weigh(y[3], geometry[0])
                 for i in range(count):
-                    out[m, q, start + i] = y[3, i]
+                    out[m, q + 1, start + i] = y[3, i]
 
 
 @njit(**options)
