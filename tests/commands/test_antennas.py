@@ -39,6 +39,7 @@ def test_bad_ports_are_refused(texts, kind, words):
         parse_ports(texts, kind)
 
 
+@pytest.mark.slow
 def test_tables_hold_what_the_library_gives(tmp_path, capsys):
     words = ["coupling", "sphere", *PORTS, "--frequency", "1:1.2:0.1GHz", "--size", 0.02, "-o", tmp_path]
     code, said, told = creeping(*words, capsys=capsys)

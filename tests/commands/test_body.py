@@ -93,6 +93,7 @@ def test_maps_and_fitted_bodies_in_the_cache(ball, tmp_path, capsys, monkeypatch
     assert not any((tmp_path / "fits").glob("*.npz")) and not state.exists()
 
 
+@pytest.mark.slow
 def test_check_of_a_mesh(ball, tmp_path, capsys):
     options = ["--units", "mm", "--wavenumber", 4 * np.pi]
     code, out, _ = creeping("check", ball, *options, "-o", tmp_path / "new", capsys=capsys)
@@ -146,6 +147,7 @@ def balls(tmp_path_factory):
     return folder / "balls.off"
 
 
+@pytest.mark.slow
 def test_options_of_files_reach_the_body(balls, capsys):
     code, _, err = creeping("check", balls, "--units", "m", "--surface", "smooth", capsys=capsys)
     assert code == 3 and "holds 2 separate surfaces" in err and "union" in err

@@ -19,6 +19,7 @@ def hasty(monkeypatch):
     monkeypatch.setattr(_progress, "EVERY", 0.6)
 
 
+@pytest.mark.slow
 def test_lines_come_by_themselves(hasty, monkeypatch, capsys):
     with Progress("values") as progress:
         progress("a fit of the mesh")

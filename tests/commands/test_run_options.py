@@ -83,6 +83,7 @@ def test_sound_has_its_speed():
     assert job.told("m") == "38 kHz, k = 161.653/m"
 
 
+@pytest.mark.slow
 def test_a_cut_across_the_wave_is_smooth_through_the_poles(tmp_path):
     """At the poles the components are those of the cut, not those of phi = 0."""
     job = run_field.job(WaveOptions(30.0), "pec", ["cut:90"], X)
@@ -98,6 +99,7 @@ def test_a_cut_across_the_wave_is_smooth_through_the_poles(tmp_path):
     assert np.max(np.abs(plain - np.abs(at))) > 0.06 * np.abs(far.total).max()
 
 
+@pytest.mark.slow
 def test_pictures_have_titles_and_components(tmp_path, monkeypatch):
     drawn = {}
 

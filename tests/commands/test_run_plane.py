@@ -12,6 +12,7 @@ from creeping.errors import InvalidInputError
 from tests.reference import sphere
 
 
+@pytest.mark.slow
 def test_planes_are_written(tmp_path, capsys):
     options = ["--direction", 0, 0, 1, "--flow", "direct", "--rays", 32, "--wavenumber", 12, "--boundary", "hard"]
     planes = ["--plane", "incidence:0.5", "--plane", "xy:1", "--observe", "backscatter"]

@@ -26,6 +26,7 @@ def test_version_as_json(capsys):
     assert said(capsys, "--version")[1].strip() == cr.__version__
 
 
+@pytest.mark.slow
 def test_cache_shows_files_and_decimal_numbers(tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("CREEPING_CACHE", str(tmp_path / "kept"))
     points, triangles = geodesic_sphere(1000)

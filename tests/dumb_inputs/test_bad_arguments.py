@@ -143,6 +143,7 @@ def test_folders_that_are_none(folder):
         cr.load_phase_map(folder, BODY)
 
 
+@pytest.mark.slow
 def test_a_cache_that_cannot_be_written_is_gone_without():
     said = []
     cr.build_phase_map(BODY, horizon=0.5, grid=(12, 12), degree=3, cache="/proc", progress=said.append)
@@ -204,6 +205,7 @@ def test_a_name_that_is_none_leads_to_one_that_is(package, name, words):
         getattr(package, name)
 
 
+@pytest.mark.slow
 def test_what_a_guessed_name_leads_to_works():
     """The texts are calls: on a sphere pi radius^2, and radius/2, within half a decibel."""
     for name, far in (("rcs", np.pi * 0.15**2), ("target_strength", 0.15**2 / 4)):

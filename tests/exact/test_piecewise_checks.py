@@ -84,6 +84,7 @@ def test_sweep_of_rays_is_that_of_each_fan():
         np.testing.assert_allclose(found["detachment"][row], fan.detachment, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_summary_tells_what_is_lost():
     body = CUT
     line, flow = cr.shadow_line(body, (1, 0, 0.2)), cr.DirectFlow(body, rtol=1e-8)

@@ -24,6 +24,7 @@ def written(path, body=BODY, request=REQUEST):
     return found
 
 
+@pytest.mark.slow
 def test_the_page_holds_its_numbers_and_loads_nothing(tmp_path, coarse):
     class Named(sc.Ellipsoid):
         def __repr__(self):

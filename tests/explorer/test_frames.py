@@ -120,7 +120,10 @@ def test_the_range_of_colours_fits_and_stays():
     assert fitted_span(np.full(4, -np.inf), span) == fitted_span(None, span) == span
 
 
-@pytest.mark.parametrize("boundary, name", [("pec", "|n × H|"), ("soft", "|du/dn|/k"), ("impedance:0.5+0.2j", "|u|")])
+@pytest.mark.parametrize(
+    "boundary, name",
+    [("pec", "|n × H|"), ("soft", "|du/dn|/k"), pytest.param("impedance:0.5+0.2j", "|u|", marks=pytest.mark.slow)],
+)
 def test_every_boundary_has_its_field(boundary, name):
     frame, mesh, found = found_of(sc.Sphere(), REQUEST.changed(boundary=boundary, wavenumber=12.0))
     assert frame.levels.shape == frame.fan.spreading.shape and name in legend(frame, RANGE)

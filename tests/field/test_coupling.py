@@ -160,8 +160,7 @@ def test_close_ones_are_on_a_plane(kind, distance):
     ("kind", "usual", "most"),
     [
         ("ports", 0.015, 0.05),
-        ("antennas", 0.02, 0.06),
-        pytest.param("monopoles", 0.02, 0.06, marks=pytest.mark.slow),
+        *(pytest.param(kind, 0.02, 0.06, marks=pytest.mark.slow) for kind in ("antennas", "monopoles")),
     ],
 )
 def test_ellipsoid_against_sources_inside(kind, usual, most):
@@ -193,7 +192,10 @@ def test_ellipsoid_against_sources_inside(kind, usual, most):
     assert np.mean((off < error + spread)[known]) > 0.95
 
 
-@pytest.mark.parametrize(("kind", "most"), [("ports", 5e-4), ("slots", 1e-3), ("monopoles", 1e-3), ("antennas", 1e-7)])
+@pytest.mark.parametrize(
+    ("kind", "most"),
+    [("ports", 5e-4), pytest.param("slots", 1e-3, marks=pytest.mark.slow), ("monopoles", 1e-3), ("antennas", 1e-7)],
+)
 def test_reciprocity(both, kind, most):
     """Sources and receivers change places: other fans, other polynomials, the same geodesics and fields."""
     there, (values, error, ok, method) = both(kind).there, both(kind).back

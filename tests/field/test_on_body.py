@@ -93,6 +93,7 @@ def test_each_ray_goes_on_where_it_detaches():
     assert len(jumps) > 10 and 0.6 < np.median(jumps) < 1.3
 
 
+@pytest.mark.slow
 def test_ground_without_rays_is_not_zero_in_silence(monkeypatch):
     """By modes: what is marched goes on there (tests/field/test_marched_field.py), and the equation knows all."""
     monkeypatch.setattr(on_body, "marches", lambda *_: False)

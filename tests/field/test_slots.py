@@ -43,6 +43,7 @@ def test_ellipsoid_against_dipoles_inside(exact):
     assert np.mean((off < [one.error[0, 1:] for one in each])[fine]) > 0.95
 
 
+@pytest.mark.slow
 def test_torsion_turns_the_field(exact):
     """Across the path at one end and along it at the other: what the torsion brings, and nothing on a sphere."""
     ports, points, there, values = exact

@@ -43,6 +43,7 @@ def test_twisted_ellipsoid_against_fundamental_solutions():
     assert np.median(off) < 0.05
 
 
+@pytest.mark.slow
 def test_far_from_the_body_the_source_is_alone(flow):
     source = np.array([0.0, 3e3, 4e3])
     found = cr.source_pattern(flow, source, TOWARDS[:2], wavenumber=K)

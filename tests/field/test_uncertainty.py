@@ -44,7 +44,9 @@ def test_bodies_known_exactly_have_none():
     assert coarse_fan(fan_of(BODY)) is None
 
 
-@pytest.mark.parametrize("boundary, order", [("soft", 1), ("pec", 2), pytest.param("hard", 2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "boundary, order", [("soft", 1), *(pytest.param(kind, 2, marks=pytest.mark.slow) for kind in ("pec", "hard"))]
+)
 def test_a_coarser_body_of_another_size_has_the_field_of_another_frequency(boundary, order):
     """A body s times as large scatters s times what the body does at the wavenumber s k: no second body is needed."""
     s, at = 1.001, grid(4)

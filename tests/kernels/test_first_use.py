@@ -87,6 +87,7 @@ def test_nothing_is_compiled_ahead_without_need(monkeypatch, tmp_path):
     assert not first_use.may_start(tmp_path, "abd")
 
 
+@pytest.mark.slow
 def test_it_ends_with_its_parent(tmp_path):
     # the parent is killed, and can tell nobody
     code = f"""
@@ -133,6 +134,7 @@ def test_what_is_compiled_ahead_is_noted_once(monkeypatch, tmp_path):
     assert ran == ["creeping.shadow.kernels.trace"] and first_use.is_done(tmp_path / "new", "abc")
 
 
+@pytest.mark.slow
 def test_the_job_runs():
     for first in ("creeping.shadow.kernels.newton", "creeping.geodesics.kernels.integrator"):
         for step in upkeep.steps(first):

@@ -120,6 +120,7 @@ def test_long_calls_are_interrupted(what, threads, tmp_path, monkeypatch):
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processor time is read from /proc")
+@pytest.mark.slow
 def test_the_command_line_says_one_line(tmp_path):
     run = "from creeping.commands.main import main; main()"
     command = [sys.executable, "-c", run, "run", "ellipsoid:a=1,b=0.8,c=0.6", "-o", str(tmp_path / "out")]

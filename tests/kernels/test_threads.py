@@ -50,7 +50,7 @@ def test_slices_are_as_long_as_their_time_allows(monkeypatch):
     assert parts[0] == 64 and 256 < max(parts) <= 2048
 
 
-@pytest.mark.parametrize("lanes, ordered", [(6, False), (12, True)])
+@pytest.mark.parametrize("lanes, ordered", [(6, False), pytest.param(12, True, marks=pytest.mark.slow)])
 def test_no_bit_depends_on_the_slices(lanes, ordered, rng, monkeypatch):
     body = sc.Ellipsoid(1.2, 0.9, 0.8)
     flow = cr.build_phase_map(body, horizon=0.5, grid=(16, 24))

@@ -16,7 +16,7 @@ EXAMPLES = {
 }
 
 
-@pytest.mark.parametrize("number", [1, 2, 3, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("number", [2, 3, *(pytest.param(number, marks=pytest.mark.slow) for number in (1, 4))])
 def test_examples_of_the_paper(number):
     body, grid, bound = EXAMPLES[number]
     flow = cr.build_phase_map(

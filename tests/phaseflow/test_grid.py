@@ -46,7 +46,7 @@ def test_least_cells_keep_the_nodes_within_the_charts(margin):
     assert cells == 1 or reach(cells - 1) > margin
 
 
-@pytest.mark.parametrize("degree", [3, 5])
+@pytest.mark.parametrize("degree", [pytest.param(3, marks=pytest.mark.slow), 5])
 def test_grid_too_small_for_the_margin_is_refused(degree):
     body = Reaching(0.6)
     least = least_cells(body) + 1 + 2 * MARGIN

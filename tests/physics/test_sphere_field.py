@@ -64,6 +64,7 @@ def test_impedance_passes_to_hard(fan, method, k):
     assert nearly == pytest.approx(hard, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_conductor_ahead_and_behind(fan):
     """The radar cross sections that are measured most; no polarisation is turned."""
     ff = cr.far_field(fan, [[0, 0, 1.0], [0, 0, -1.0]], wavenumber=100.0, boundary="pec")

@@ -34,6 +34,7 @@ def fan(body):
 
 
 @another
+@pytest.mark.slow
 def test_a_phase_map_composes_the_same_rays(phase_map, again):
     same = again(phase_map)
     np.testing.assert_array_equal(same.flow(*START), phase_map.flow(*START))

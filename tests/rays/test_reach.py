@@ -60,6 +60,7 @@ def test_the_wave_has_died_away_on_all_but_a_tenth_of_the_rays(body):
     assert abs(np.mean(died) - (1 - SPARED)) < 0.04
 
 
+@pytest.mark.slow
 def test_at_most_four_sizes():
     body = sc.Ellipsoid(0.1, 2.0, 2.0)
     assert ray_length(cr.shadow_line(body, (0.1, 1, 0)), wavenumber=0.2) == pytest.approx(LONGEST * size(body))

@@ -63,6 +63,7 @@ def test_singular_incidences_give_nothing():
     assert LineStatus.FAILED not in found["incidence_status"]
 
 
+@pytest.mark.slow
 def test_non_smooth_regions_ends_rays():
     body = sc.Implicit("x**2 + y**2 + 1.2*z**2 - 1")
     non_smooth = type("NonSmooth", (), {"non_smooth": staticmethod(lambda x: x[..., 2] > 0.8)})

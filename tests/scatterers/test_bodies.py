@@ -28,6 +28,7 @@ def test_every_body_passes_its_check(body):
     assert isinstance(body, Surface)
 
 
+@pytest.mark.slow
 def test_fine_ripples_are_no_wrong_derivatives():
     """Fits of noisy meshes have them: differences of second order err by 7e-6 of the Hessian here."""
     assert cr.check_surface(sc.Implicit("x**2 + y**2 + z**2 - 1 + 1e-5*sin(500*x)")).ok

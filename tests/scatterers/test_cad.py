@@ -171,6 +171,7 @@ def test_edges_and_joints_are_taken_in_pieces(files):
     assert np.median(np.abs(on)) < 1e-12
 
 
+@pytest.mark.slow
 def test_fillets_are_joints(files):
     # the rims of the fillet: about the cylinder of radius 0.5, and about the lid of radius 0.3
     assert kinds(parted(files / "filleted.brep")) == [("edge", 3.14), ("joint", 1.88), ("joint", 3.14)]
@@ -187,6 +188,7 @@ def test_halves_of_one_face_are_parted_by_seams(files):
     assert np.all(halves.level(points) < 0) and np.all(halves.level(points * [1.05, 1.05, 1]) > 0)
 
 
+@pytest.mark.slow
 def test_parts_of_a_cad_file_are_chosen(files):
     largest, second = (parted(files / "two.brep", points=800, part=part) for part in ("largest", 2))
     at = directions(np.random.default_rng(8), 50)
@@ -363,6 +365,7 @@ def test_ends_that_are_sharper_than_their_points_are_followed_by_normals(files):
     assert len(tiles[0].points) < 1.2 * len(tiles[1].points)
 
 
+@pytest.mark.slow
 def test_second_opening_takes_the_fit_from_the_cache(files, tmp_path, monkeypatch):
     path, messages = files / "ellipsoid.step", []
     first = sc.Cad(path, points=2000, cache=tmp_path, progress=messages.append)

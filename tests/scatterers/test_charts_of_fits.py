@@ -21,6 +21,7 @@ def stored(folder):
     return path.stat().st_size
 
 
+@pytest.mark.slow
 def test_rays_make_no_charts(tmp_path):
     body = torus(tmp_path)
     without = stored(tmp_path)

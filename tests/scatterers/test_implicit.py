@@ -122,6 +122,7 @@ def test_scale_changes_nothing_but_lengths(name, scale):
     np.testing.assert_allclose(found, np.multiply(scale, lengths), rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_off_the_origin():
     body = Implicit("(x-3)**2/1.44 + (y+2)**2/0.64 + (z-1.5)**2/0.64 - 1")
     assert cr.check_surface(body).ok and body.star_shaped

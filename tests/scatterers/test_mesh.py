@@ -226,6 +226,7 @@ def test_a_damaged_fit_is_made_again_signed_or_not(tmp_path, which):
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="no such permissions here")
+@pytest.mark.slow
 def test_a_fit_that_others_could_write_is_not_taken(tmp_path):
     open_in(tmp_path)
     (file,) = tmp_path.iterdir()
@@ -323,6 +324,7 @@ def test_options_are_checked(options, error, match):
         sc.Mesh("nowhere.stl", **options)
 
 
+@pytest.mark.slow
 def test_a_coarse_mesh_is_judged_by_its_fit():
     body = sc.Mesh(as_mesh(*torus_grid(444)), cache=False)
     assert body.quality.verdict == "too coarse" and body.creases == ()

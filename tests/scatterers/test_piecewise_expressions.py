@@ -47,7 +47,7 @@ EXACT = {
     "cone": (np.pi * (1 + np.sqrt(2)), np.pi / 3),
     "two balls": (2 * 2 * np.pi * 1.5, 2 * CAP),
 }
-QUICK = ("capsule", "cone", "seam")
+QUICK = ("capsule", "cone")
 every = pytest.mark.parametrize(
     "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in TEXTS]
 )

@@ -28,6 +28,7 @@ def two():
             yield client
 
 
+@pytest.mark.slow
 def test_one_and_two_workers_and_none_give_the_same_bytes(two, tmp_path):
     # d_z of other numbers of incidences is no poison
     plan = fake.plan(41, 3)

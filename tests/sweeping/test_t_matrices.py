@@ -34,6 +34,7 @@ def test_the_average_of_a_long_spheroid_is_that_by_rings():
     assert np.abs(found.scattering / found.extinction - 1).max() < 1e-5
 
 
+@pytest.mark.slow
 def test_averages_stand_with_their_units_and_errors():
     found = cr.orientation_averages(sc.Sphere(), **ASKED)
     assert found.wavenumber.values.tolist() == ASKED["wavenumbers"] and found.backscattering.units == "L^2"

@@ -34,7 +34,7 @@ def curvatures(level, level_par, speed, speed_par, weighted, states, out):
 
 @njit(**entry_options)
 def curvatures_between(level, level_par, speed, speed_par, weighted, jets, first, weights, out):
-    """c^(3/2) kappa_n at points of polynomials (`attenuation.Sliding`), into out (intervals, NODES, n) but for its ends.
+    """c^(3/2) kappa_n at points of polynomials (`attenuation.Sliding`), into out[:, 1:-1] (intervals, points, n).
 
     jets (n, knots, 9) are x, x' and x'' at the knots, the knots of an interval four from its ``first`` on; weights
     (intervals, points, 2, 4, 3) those of x and x' at its points.

@@ -58,6 +58,7 @@ def test_divergence_of_a_field_on_a_sphere(rng):
     np.testing.assert_allclose(cross.divergence(v), np.outer(-2 * x @ c, [1.0, 2j]), atol=1e-3)
 
 
+@pytest.mark.slow
 def test_the_focus_behind_a_sphere(ball, mie):
     x = OBLIQUE[None] + 1e-3 * np.array([[0.0, 0.0, 0.0], [0.8, -0.6, 0.0], [0.0, 5.0, -3.0]])
     x /= np.linalg.norm(x, axis=1, keepdims=True)

@@ -113,6 +113,7 @@ def test_methods_agree_within_their_errors(ball_fan, rng):
     assert np.mean(gap <= both[0].error + both[1].error) > 0.9
 
 
+@pytest.mark.slow
 def test_who_serves(ball_fan):
     r = np.array([[0.0, 1.0, 0.0]])
     assert cr.far_field(ball_fan, r, wavenumber=20.0).error_by == "extinction"
@@ -133,6 +134,7 @@ def test_bad_methods_are_named(ball_fan, asked, message):
         cr.far_field(ball_fan, [(0, 1, 0)], wavenumber=20.0, **asked)
 
 
+@pytest.mark.slow
 def test_an_impedance_on_varying_curvature():
     # without what rho' does to q the error is two and a half times as large, and stands ahead
     kept = stored.read("ellipsoid_impedance")

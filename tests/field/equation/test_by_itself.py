@@ -58,6 +58,7 @@ def test_a_convex_body_in_all_of_space(ellipsoid, boundary):
     assert off.max() < 2e-3 and np.mean(off <= near.error) > 0.95
 
 
+@pytest.mark.slow
 def test_the_equation_is_taken_by_itself_where_expansions_leave_much(monkeypatch):
     fan = fan_of(sc.Sphere(), (1, 2, 3))
     assert not cr.surface_currents(fan, wavenumber=K).solved

@@ -34,7 +34,9 @@ def sheared(*shears):
     return sc.Facets(box)
 
 
-@pytest.mark.parametrize("boundary", ["soft", pytest.param("hard", marks=pytest.mark.slow), "pec"])
+@pytest.mark.parametrize(
+    "boundary", ["soft", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("hard", "pec"))]
+)
 @pytest.mark.parametrize(
     ("name", "flips"), [("cylinder", ((0,), (1,), (2,))), ("cone", ((0,), (1,))), ("sheared", ((2,), (0, 1)))]
 )

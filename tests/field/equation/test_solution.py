@@ -85,6 +85,7 @@ def test_reciprocity_and_the_optical_theorem_of_a_body_with_edges(flat):
     assert power == pytest.approx(4 * np.pi / 3.0 * flat.far_field(d[3][None], 3).total[0].imag, rel=3e-3)
 
 
+@pytest.mark.slow
 def test_far_field_of_a_fan_is_that_of_the_equation_where_edges_diffract(flat):
     fan = cr.launch(cr.DirectFlow(CYLINDER, rtol=1e-8), cr.shadow_line(CYLINDER, (0.48, 0.6, -0.64)), length=2.0)
     for method in ("auto", "equation"):

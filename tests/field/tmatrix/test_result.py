@@ -15,7 +15,7 @@ POLES = np.array([[0, 0, 1.0], [0, 0, -1.0], [0.1, 0.2, 0.3], [1, 0, 0]])
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 
 
-@pytest.fixture(name="T", scope="module", params=["hard", "pec"])
+@pytest.fixture(name="T", scope="module", params=["hard", pytest.param("pec", marks=pytest.mark.slow)])
 def of_an_ellipsoid(request):
     # any matrix will do, a reciprocal and lossless one tells more
     return cr.t_matrix(sc.Ellipsoid(0.5, 0.4, 0.3), wavenumber=3.0, boundary=request.param, center=(0.1, 0.0, 0.05))

@@ -14,7 +14,7 @@ CLUSTER = Path(__file__).parent / "treams_cluster.tmat.h5"
 """Two spheres of permittivity 4 and 6, k = 1.3, order 4, written by treams 0.4.7."""
 
 
-@pytest.fixture(name="T", scope="module", params=["soft", "pec"])
+@pytest.fixture(name="T", scope="module", params=["soft", pytest.param("pec", marks=pytest.mark.slow)])
 def of_an_ellipsoid(request):
     return cr.t_matrix(sc.Ellipsoid(0.5, 0.4, 0.3), wavenumber=2.0, boundary=request.param, center=(0.1, 0.0, 0.2))
 

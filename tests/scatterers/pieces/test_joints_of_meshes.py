@@ -42,7 +42,7 @@ def opened(name):
     return sc.Mesh(SimpleNamespace(vertices=points @ turn.T, faces=triangles), cache=False), exact, turn
 
 
-@pytest.mark.parametrize("name", ["even", "cone", pytest.param("long", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["cone", *(pytest.param(name, marks=pytest.mark.slow) for name in ("even", "long"))])
 def test_joints_are_those_of_the_exact_body(name):
     body, exact, turn = opened(name)
     assert body.quality.verdict == "curvature jumps" and "on joints of planes and quadrics" in body.quality.reasons
@@ -70,7 +70,9 @@ def distance(body, points):
     return body.level(points) / np.linalg.norm(body.gradient(points), axis=1)
 
 
-@pytest.mark.parametrize("name, direction", [("even", (0.3, 0.5, 0.8)), ("cone", (0.2, 0.9, -0.5))])
+@pytest.mark.parametrize(
+    "name, direction", [pytest.param("even", (0.3, 0.5, 0.8), marks=pytest.mark.slow), ("cone", (0.2, 0.9, -0.5))]
+)
 def test_shadow_line_and_rays_are_those_of_the_exact_body(name, direction):
     body, exact, turn = opened(name)
     d = np.array(direction) / np.linalg.norm(direction)

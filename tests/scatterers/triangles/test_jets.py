@@ -50,7 +50,9 @@ EXPECTED = {
 }
 
 
-@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if "2k" in name else pytest.mark.slow) for name in MESHES]
+)
 def test_normals_and_curvatures_are_exact_to_their_order(name):
     body, vertices, _, jets = made(name)
     assert jets.fitted.all()

@@ -127,6 +127,7 @@ def test_subdivision_of_a_coarse_mesh_is_told():
     assert sc.examined_mesh(ball(times=3), subdivide="auto")[0].repairs == ()
 
 
+@pytest.mark.slow
 def test_a_subdivided_mesh_passes_by_its_vertices_and_errs_about_as_stated():
     axes, mesh = (1, 0.8, 0.6), ball()
     mesh.apply_scale(axes)
@@ -149,6 +150,7 @@ def test_a_noisy_mesh_is_no_better_for_a_narrower_grid(rng):
         sc.Mesh(mesh, subdivide=1, cache=False)
 
 
+@pytest.mark.slow
 def test_a_mesh_whose_curvature_is_within_its_edges_is_refused():
     """At the rim of a flat ellipsoid, not at the ends of a long one, whose long edges lie along it."""
     flat, long = ball(times=1), ball(times=1)

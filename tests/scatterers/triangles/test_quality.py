@@ -54,7 +54,9 @@ FAULTY = {
 }
 
 
-@pytest.mark.parametrize("name", SMOOTH)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if "2k" in name else pytest.mark.slow) for name in SMOOTH]
+)
 def test_smooth_meshes_pass(name):
     quality = judged(*SMOOTH[name]())
     assert quality.verdict == "smooth", quality
@@ -62,7 +64,9 @@ def test_smooth_meshes_pass(name):
     assert quality.noise < 1e-5
 
 
-@pytest.mark.parametrize("name", FAULTY)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow if "slivers" in name else ()) for name in FAULTY]
+)
 def test_faults_are_named(name):
     source, verdict = FAULTY[name]
     quality = judged(*source())
