@@ -33,9 +33,10 @@ def undisturbed(words, folder):
 
 @pytest.mark.parametrize(
     ("words", "number"),
-    [pytest.param(TS, signal.SIGTERM, marks=pytest.mark.slow), (RCS, signal.SIGINT)],
+    [(TS, signal.SIGTERM), (RCS, signal.SIGINT)],
     ids=["a matrix a frequency", "tasks of angles"],
 )
+@pytest.mark.slow
 def test_ended_at_random_moments_it_comes_to_the_same_bytes(tmp_path, monkeypatch, capsys, words, number):
     monkeypatch.setattr(blocks, "TASK", 4)
     with ending_at(SweepStore, "put", 0) as calls:

@@ -198,6 +198,7 @@ def test_no_command_line_has_the_token(monkeypatch):
     assert asked.startswith("file://") and "secret" not in asked and not Path(urlsplit(asked).path).exists()
 
 
+@pytest.mark.slow
 def test_only_so_many_pages_are_let_in(page):
     from websockets.exceptions import InvalidStatus
 

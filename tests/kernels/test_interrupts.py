@@ -40,7 +40,7 @@ LONG = {
     "direct.transport(s[:64], np.ones(1)); ready()\n"
     "direct.transport(s, np.array([99.0]))",
 }
-QUICK = (("flow of one block", 2), ("numpy methods", 1))
+QUICK = (("flow of one block", 2),)
 
 
 def seconds_of(process):

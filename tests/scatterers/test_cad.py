@@ -215,12 +215,13 @@ def test_parts_that_cross_are_united(files):
     "name, options, pieces",
     [
         # what the wall leaves of the larger face, and the wall
-        pytest.param("joined.brep", {"part": "largest"}, 7, marks=pytest.mark.slow),
-        pytest.param("touching.brep", {"part": 2}, 6, marks=pytest.mark.slow),
-        pytest.param("joined.brep", {"union": True}, None, marks=pytest.mark.slow),
+        ("joined.brep", {"part": "largest"}, 7),
+        ("touching.brep", {"part": 2}, 6),
+        ("joined.brep", {"union": True}, None),
         ("touching.brep", {"union": True}, None),
     ],
 )
+@pytest.mark.slow
 def test_solids_that_share_a_wall_have_an_outer_surface(files, name, options, pieces):
     """Boxes of volumes 1 and 2: as they touch, edges of the wall between them have more than two triangles."""
     with pytest.raises(ValueError, match=r"2 separate surfaces.*part='largest', or all with union=True"):

@@ -87,6 +87,7 @@ def test_triaxial(triaxial, rng):
     assert np.max(np.abs(np.einsum("nc,nci->ni", n, found.values))) < 1e-8
 
 
+@pytest.mark.slow
 def test_polarisations(ball, rng):
     x = directions(rng, 8)
     both = cr.conductor_current(ball, x, wavenumber=30.0)

@@ -34,7 +34,7 @@ SPHERE = {"soft": {10.0: 2e-3, 40.0: 1e-4}, "hard": {10.0: 8e-3, 40.0: 6e-4}}
 ABSORBING = {10.0: 5e-3, 40.0: 5e-4}
 
 
-@pytest.mark.parametrize("boundary", ["soft", "hard", 0.7])
+@pytest.mark.parametrize("boundary", ["soft", "hard", pytest.param(0.7, marks=pytest.mark.slow)])
 def test_sphere(ball_fan, boundary, rng):
     kind = cr.ImpedanceBoundary(boundary) if boundary == 0.7 else boundary
     r = np.concatenate([directions(rng, 300), [OBLIQUE, -OBLIQUE]])

@@ -71,6 +71,7 @@ def test_orders():
     np.testing.assert_allclose(ratio, [3, 5, 7], atol=0.3)
 
 
+@pytest.mark.slow
 def test_lower_degrees_differ_from_the_highest_by_their_errors():
     body, vertices, _, jets = made("torus 10k")
     gaussian, _ = curvatures(body, vertices)
