@@ -139,3 +139,18 @@ def test_rays_that_fail_are_numbered_through(rng, monkeypatch):
     with pytest.raises(cr.IntegrationError, match="rays from 64") as caught:
         cr.DirectFlow(body).transport(states, np.array([1.0]))
     assert 70 in caught.value.failed and min(caught.value.failed) >= 64
+
+
+@pytest.mark.parametrize("body", [sc.Torus(1.0, 0.4), sc.Sphere(speed="1 + 0.2*x")], ids=["torus", "weighted"])
+@pytest.mark.parametrize("count", [5, 150])
+def test_curvatures_between_knots_are_those_of_the_rays(body, count, rng):
+    times = np.linspace(0, 1.2, 7)
+    states = trace_states(body, pack(*random_bundle_points(body, count, rng=rng)), times, rtol=1e-10)
+    fine = attenuation.sliding(times[1:], 0.2, attenuation.fine_rules()[0])
+    assert len(fine.times) == len(times)
+    bent = attenuation._bent(body, states, fine)
+    # of the rays themselves, traced to the points
+    points = (fine.times[:-1, None] + np.diff(fine.times)[:, None] * attenuation.fine_rules()[0]).ravel()
+    there = trace_states(body, states[:, 0], points, rtol=1e-12)
+    wanted = attenuation.curvature_values(body, there.reshape(-1, 6)).reshape(count, len(fine.first), -1)
+    assert np.allclose(np.moveaxis(bent[:, 1:-1], 2, 0), wanted, rtol=0, atol=1e-5)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import BarycentricInterpolator
 
 from creeping.shadow.arcs import breaks_of, shared_out
 from creeping.shadow.curves import Curves, LineNodes, interpolated
@@ -87,3 +88,11 @@ def test_a_cusp_at_a_node_is_there():
     nodes = LineNodes(circle, tangents, kappa, np.array([0, n]), np.array([2 * np.pi / n]), 0.0)
     found = breaks_of(Curves.of(np.array([[0.0, 0.0, 1.0, 0.0]]), [nodes]), np.array([[-1.0] * 3, [1.0] * 3]))
     np.testing.assert_allclose(found.place, [16, 48], atol=1e-9)
+
+
+@pytest.mark.parametrize("place", [0.3, 4.0, 5.99, 12.5, -3.7, 27.2])
+def test_between_nodes_is_the_polynomial_through_the_twelve_around(place, rng):
+    rows, first, number = rng.normal(size=(40, 3)), 7, 13
+    nodes = np.floor(place) + np.arange(-5, 7)
+    wanted = BarycentricInterpolator(nodes, rows[first + nodes.astype(int) % number])(place)
+    assert np.allclose(interpolated(rows, first, number, np.array([place]))[0], wanted, rtol=0, atol=1e-12)

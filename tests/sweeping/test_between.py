@@ -5,6 +5,8 @@ import pytest
 import shared_bodies as sc
 
 import creeping as cr
+from creeping.sweeping.plan import task_size
+from creeping.sweeping.request import sweep_request, with_lattice
 
 BODY = sc.Ellipsoid(1.2, 0.85, 0.7)
 FLOW = cr.DirectFlow(BODY, rtol=1e-9)
@@ -98,3 +100,10 @@ def test_an_accuracy_is_a_number_between_0_and_1_of_fields_by_rays(accuracy):
         cr.sweep_directions(FLOW, arc(0, 3, 1.0), quantity="rays", n_rays=4, length=1.0, accuracy=1e-3)
     with pytest.raises(cr.CreepingError, match="accuracy goes with rays"):
         cr.sweep_directions(FLOW, arc(0, 3, 1.0), accuracy=1e-3, method="currents", boundary="hard", **FIELD)
+
+
+def test_a_cut_comes_in_large_tasks_whose_incidences_share_nodes():
+    asked = sweep_request("monostatic", length=1.0, n_rays=32, wavenumbers=(20.0,), boundary=["soft"], accuracy=1e-3)
+    request = with_lattice(asked, arc(0.0, 360.0, 0.025))
+    assert request.lattice is not None
+    assert task_size(request, 14_400, shared=False) == 4096 > 8 * task_size(asked, 14_400, shared=False)
