@@ -95,7 +95,7 @@ def test_fields_at_points(kind, scale):
         np.testing.assert_array_equal(other.status, one.status)
         np.testing.assert_array_equal(other.method, one.method)
         compare(np.asarray(other) * its_unit, np.asarray(one) * unit, TRACED)
-        compare(other.error * its_unit, one.error * unit, TRACED)
+        compare(other.error * its_unit, one.error * unit, ENDS if np.any(one.method == "equation") else TRACED)
         if kind == "pec":
             compare(other.charge, one.charge, TRACED)
 
