@@ -23,11 +23,7 @@ def curvatures(level, level_par, speed, speed_par, weighted, states, out):
         for i in range(BLOCK):
             for k in range(6):
                 y[k, i] = states[start + min(i, count - 1), k]
-        level(y[:3], geometry[0], geometry[1:4], geometry[4:], level_par)
-        _curvature(y.reshape(-1), geometry.reshape(-1))
-        if weighted:
-            speed(y[:3], geometry[0], geometry[1:4], geometry[4:], speed_par)
-            _weigh(y[3], geometry[0])
+        _curvature(level, level_par, speed, speed_par, weighted, y, geometry)
         for i in range(count):
             out[start + i] = y[3, i]
 
@@ -52,11 +48,7 @@ def curvatures_between(level, level_par, speed, speed_par, weighted, jets, first
                 y[:] = 0.0
                 for j in range(4):
                     _add(weights[m, q, 0, j], weights[m, q, 1, j], own[first[m] + j], y.reshape(-1))
-                level(y[:3], geometry[0], geometry[1:4], geometry[4:], level_par)
-                _curvature(y.reshape(-1), geometry.reshape(-1))
-                if weighted:
-                    speed(y[:3], geometry[0], geometry[1:4], geometry[4:], speed_par)
-                    _weigh(y[3], geometry[0])
+                _curvature(level, level_par, speed, speed_par, weighted, y, geometry)
                 for i in range(count):
                     out[m, q + 1, start + i] = y[3, i]
 
@@ -72,8 +64,10 @@ def _add(position, velocity, jet, y):
 
 
 @njit(**options)
-def _curvature(y, g):
-    """kappa_n along the vectors of a block of states, into the fourth row of y; all rows flat."""
+def _curvature(level, level_par, speed, speed_par, weighted, states, geometry):
+    """c^(3/2) kappa_n of a block of states (6, BLOCK), into their fourth row; geometry (10, BLOCK) is work space."""
+    level(states[:3], geometry[0], geometry[1:4], geometry[4:], level_par)
+    y, g = states.reshape(-1), geometry.reshape(-1)
     for i in range(BLOCK):
         px, py, pz = y[3 * BLOCK + i], y[4 * BLOCK + i], y[5 * BLOCK + i]
         gx, gy, gz = g[BLOCK + i], g[2 * BLOCK + i], g[3 * BLOCK + i]
@@ -81,13 +75,10 @@ def _curvature(y, g):
         bent = second_form(px, py, pz, xx, yy, zz, yz, g[8 * BLOCK + i], g[9 * BLOCK + i])
         steep = math.sqrt(gx * gx + gy * gy + gz * gz)
         y[3 * BLOCK + i] = bent / ((px * px + py * py + pz * pz) * steep)
-
-
-@njit(**options)
-def _weigh(bent, c):
-    """Multiply curvatures by c^(3/2)."""
-    for i in range(BLOCK):
-        bent[i] *= c[i] * math.sqrt(c[i])
+    if weighted:
+        speed(states[:3], geometry[0], geometry[1:4], geometry[4:], speed_par)
+        for i in range(BLOCK):
+            y[3 * BLOCK + i] *= g[i] * math.sqrt(g[i])
 
 
 @njit(**options)
